@@ -1,8 +1,8 @@
 #pragma once
 // Turns Ctrl-C, SIGTERM and SIGHUP into a flag that the run reads between steps, so that its files end whole. A second
-// signal ends the program at once, if it comes a second or more later. (A terminal and a parent may each send one.) The
-// handler stays after the first signal, since the second may come while the program ends. An ignored SIGHUP (nohup)
-// stays ignored. While the guard exists, SIGPIPE does not end the program: the reader of its progress may be gone.
+// signal ends the program at once, if it comes a second or more later. A terminal and a parent may each send one. The
+// handler stays after the first signal: the second may come while the program ends. An ignored SIGHUP (nohup) stays
+// ignored. While the guard exists, SIGPIPE does not end the program: the reader of its progress may be gone.
 
 #include <csignal>
 #include <ctime>

@@ -6,7 +6,7 @@ extern "C" {
 __constant__ gart::candidates_launch launch;
 }
 
-// The payload of a ray: its boxes so far, the room for their ids, and the address of these in two words.
+// The payload of a ray: its boxes so far, and the room for their ids. Two words hold the address of these.
 extern "C" __global__ void __raygen__candidates() {
   unsigned const i = optixGetLaunchIndex().x;
   float4 const a = launch.rays[2 * i], b = launch.rays[2 * i + 1];

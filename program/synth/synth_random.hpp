@@ -1,7 +1,6 @@
 #pragma once
-// Random numbers of `gart synth` that depend only on their indices, so images are the same for any number of threads.
-// They are an integer hash, and Owen-scrambled Sobol pairs (B. Burley, "Practical Hash-based Owen Scrambling", JCGT
-// 2020).
+// Random numbers of `gart synth` depend only on their indices. So images are the same for any number of threads. They
+// are an integer hash, and Owen-scrambled Sobol pairs (B. Burley, "Practical Hash-based Owen Scrambling", JCGT 2020).
 
 #include <gart/core/types.hpp>
 #include <gart/math/glm.hpp>

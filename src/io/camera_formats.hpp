@@ -13,8 +13,9 @@ namespace gart::io {
 struct camera_format {
   int number;  // COLMAP's; below zero where it has none
   std::string_view name;
-  std::string_view fields;  // COLMAP's parameters in their order, each by its name in files, f both focal lengths, and
-                            // behind a = by that of the camera's member (scene/camera.hpp) where it is another
+  // COLMAP's parameters in their order, each by its name in files; f: both focal lengths. Behind a = stands the
+  // camera's member (scene/camera.hpp) where its name differs.
+  std::string_view fields;
   std::optional<camera_kind> kind;
 
   int parameters() const;

@@ -66,7 +66,7 @@ void find_photos(capture& c);
 // Masks in a folder `masks` beside that of the photos, where the files of the capture name none.
 void find_masks(capture& c);
 
-// The place of a kind of maps: a folder of that name beside the photos', then the photo's path within its own.
+// The place of a kind of maps: a folder of that name beside the photos'. There a map has the photo's path.
 struct place_beside {
   std::filesystem::path folder, below;
 };

@@ -1,4 +1,4 @@
-// PlayCanvas' compressed PLY: Gaussians in chunks of 256, each number a share of a 32-bit word between the chunk's
+// PlayCanvas' compressed PLY: Gaussians in chunks of 256. Each number is a share of a 32-bit word between the chunk's
 // least and greatest. Spherical harmonics take a byte each, from -4 to 4. https://github.com/playcanvas/splat-transform
 
 #include "bulk.hpp"

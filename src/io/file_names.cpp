@@ -27,7 +27,7 @@ std::vector<std::string> parts_of(std::string const& path) {
   return parts;
 }
 
-// The number of equal parts of two paths from the end, if only a folder of photos is left of one.
+// The number of equal parts of two paths, counted from the end, if only photos' folders remain of one.
 std::size_t alike(std::vector<std::string> const& a, std::vector<std::string> const& b) {
   std::size_t n = 0;
   while (n < std::min(a.size(), b.size()) && a[n] == b[n]) ++n;

@@ -1,6 +1,6 @@
 #pragma once
-// Traces pixels in double (reference.hpp has the definitions). It has the Gaussians relative to the camera, and a cone
-// that culls most of them for a block of pixels. It has a ray's hits in order, compositing and its gradient.
+// Traces pixels in double (reference.hpp has the definitions). It has the Gaussians relative to the camera. A cone
+// culls most of them for a block of pixels. It has a ray's hits in order, compositing and its gradient.
 
 #include "rays.hpp"
 
@@ -203,8 +203,8 @@ class pixel_tracer {
     }
   }
 
-  // alpha = sigma rho(|p|) with p = S^-1 R^T (o + t d - mean); t is where |p| is least, so moving it changes nothing.
-  // `a` is alpha dL/dalpha. to: mean, log-scale, quaternion, opacity.
+  // alpha = sigma rho(|p|) with p = S^-1 R^T (o + t d - mean). At t |p| is least, so moving t changes nothing. `a` is
+  // alpha dL/dalpha. to: mean, log-scale, quaternion, opacity.
   void add_geometry(body const& g, reference_hit const& h, pixel_ray const& ray, double a, double* to) const {
     double const b = a * kernel_.slope(dot(h.p, h.p));
     vec3d const by_body = -b * h.p * g.inverse_scale;  // dL by R^T (o + t d - mean)
@@ -224,7 +224,7 @@ class pixel_tracer {
     add_rotation(g, ray.origin - g.mean, by_origin, to), add_rotation(g, ray.direction, by_direction, to);
   }
 
-  // x . R v with R v = v + 2 w u x v + 2 u x (u x v), by (w, u); then through the division by the norm.
+  // x . R v with R v = v + 2 w u x v + 2 u x (u x v), by (w, u). Then through the division by the norm.
   static void add_rotation(body const& g, vec3d const& x, vec3d const& v, double* to) {
     vec3d const& u = g.axis;
     double by_w = 2 * dot(x, cross(u, v));

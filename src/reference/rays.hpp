@@ -17,8 +17,8 @@ struct pixel_ray {
   vec3d origin{0.0}, direction{0.0};
 };
 
-// The map of a point (a, b) by a lens's polynomials, also of complex numbers: slopes for a perspective lens, angles for
-// a fisheye.
+// The map of a point (a, b) by a lens's polynomials, also of complex numbers. For a perspective lens a and b are
+// slopes, for a fisheye angles.
 template <class T>
 void bend(distortion const& l, bool tangential_last, T a, T b, T& u, T& v) {
   T const r2 = a * a + b * b;
@@ -41,8 +41,8 @@ struct lens_point {
   bool found;
 };
 
-// The point that is sent to (u, v): Newton's method along the way from the axis, where the lens is the identity. Short
-// steps keep it on the branch that begins there. Not found where that folds.
+// The point that is sent to (u, v), by Newton's method along the way from the axis. There the lens is the identity.
+// Short steps keep it on the branch that begins there. Not found where that folds.
 inline lens_point unbent(distortion const& l, bool tangential_last, double u, double v) {
   if (!l.any()) return {u, v, true};
   using complex = std::complex<double>;

@@ -59,7 +59,7 @@ std::vector<double> principal_directions(feature_view<float const> const& f) {
   constexpr int steps = 100;
   std::size_t const w = width_of(f);
   std::vector<double> const cov = covariance_of(f);
-  // From a little aside of the axes of the largest variances, so that no direction is at right angles to all.
+  // Starts a little aside of the axes of the largest variances. So no direction is at right angles to all.
   std::vector<std::size_t> by_variance(w);
   for (std::size_t k = 0; k < w; ++k) by_variance[k] = k;
   std::stable_sort(by_variance.begin(), by_variance.end(),

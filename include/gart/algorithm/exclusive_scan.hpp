@@ -3,9 +3,9 @@
 /// Counts to offsets: out[i] = in[0] + ... + in[i - 1], and total[0] = the sum of all.
 ///
 /// in: n counts. out: n offsets, T = u32 or u64; must not overlap `in`. total: one element of the policy's memory, or
-/// empty; it may be the element after `out`, which makes the n + 1 offsets of a segmented array. Sums are formed in T:
-/// take u64 unless the total is known to fit in 32 bits, as u32 wraps. n = 0 gives total 0; n may pass 2^32.
-/// Cost: reads `in` twice (CUDA: once), writes `out` once. Errors: invalid_argument where a span is too short.
+/// empty. It may be the element after `out`: then `out` has the n + 1 offsets of a segmented array. Sums are formed in
+/// T: take u64 unless the total is known to fit in 32 bits, as u32 wraps. n = 0 gives total 0; n may pass 2^32. Cost:
+/// reads `in` twice (CUDA: once), writes `out` once. Errors: invalid_argument where a span is too short.
 
 #include <gart/algorithm/host_blocks.hpp>
 #include <gart/core/error.hpp>

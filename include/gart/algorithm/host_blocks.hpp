@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// How the algorithms split an array over the threads of a host policy: into contiguous blocks, one a thread, in any
-/// order. What depends on the number of blocks must not reach a result.
+/// How the algorithms split an array over a host policy's threads: into contiguous blocks, one a thread, in any order.
+/// What depends on the number of blocks must not reach a result.
 
 #include <gart/core/isa.hpp>
 #include <gart/exec/concepts.hpp>

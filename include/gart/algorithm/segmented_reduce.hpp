@@ -3,10 +3,9 @@
 /// Sums of runs of rows, in a fixed order: sums[s][c] = rows[offsets[s]][c] + ... + rows[offsets[s + 1] - 1][c].
 ///
 /// rows: float, row-major, `columns` wide. offsets: segments + 1 row numbers (u32 or u64), ascending, as exclusive_scan
-/// writes them with its total behind. sums: segments x columns, overwritten; an empty segment gives 0.
-/// The order of additions depends on the segment's length only, and all policies share it: the bits are the same on
-/// all. Cost: reads rows once, one lane a (segment, column). Errors: invalid_argument for a short span, or for more
-/// than 2^32 - 1 sums.
+/// writes them with its total behind. sums: segments x columns, overwritten; an empty segment gives 0. The order of
+/// additions depends on the segment's length only, and all policies share it. So all give the same bits. Cost: reads
+/// rows once, one lane a (segment, column). Errors: invalid_argument for a short span, or for more than 2^32 - 1 sums.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/exec/parallel.hpp>

@@ -57,8 +57,9 @@ class backward_pass {
   explicit backward_pass(execution_type& exec)
       : moments_(exec), own_footprints_(exec), map_(exec), slots_(exec), rows_(exec), last_(exec), depths_(exec) {}
 
-  /// After the frame's preparation: a tracer that has the view's footprints lends them. False, and nothing allocated,
-  /// where the hit buffer would take more than byte_budget (0: no limit) or have more slots than 32 bits can number.
+  /// After the frame's preparation: a tracer that has the view's footprints lends them. Returns false and allocates
+  /// nothing where the hit buffer would exceed byte_budget (0: no limit). The same where its slots are more than 32
+  /// bits can number.
   [[nodiscard]] bool prepare(Frame const& frame, u64 byte_budget = 0) {
     stands_at_ = nothing, frame_ = &frame, preparation_ = frame.preparation();
     if constexpr (records) {
@@ -112,8 +113,8 @@ class backward_pass {
     depth_.depth = targets.depth, depth_.transmittance = targets.transmittance;
   }
 
-  /// Of the last differentiate(), [N][moment_stride]: at error_place the error that is seen through each Gaussian,
-  /// where the pixels' errors were given.
+  /// The moments of the last differentiate(), [N][moment_stride]. Where pixels had errors, error_place holds the error
+  /// seen through each Gaussian.
   span<float const> moments() const { return moments_; }
   /// The same, for gradients of other channels to be added to before finish_gradients.
   span<float> moments() { return moments_; }
@@ -249,9 +250,9 @@ class backward_pass {
   depth_image depth_;
 };
 
-/// From the gradients of the image that the pass rendered to those of the scene's parameters, without the filter of the
-/// pixels. Given an error a pixel, [H][W], it also attributes the errors to the Gaussians: the sum over a Gaussian's
-/// hits of weight times error (backward_pass.moments).
+/// Turns the gradients of the image that the pass rendered into those of the scene's parameters, without the pixels'
+/// filter. Given an error a pixel, [H][W], it also attributes the errors to the Gaussians (backward_pass.moments). A
+/// Gaussian's sum over its hits is of weight times error.
 template <class Frame, gradient_method Method>
 void differentiate(Frame& frame, backward_pass<Frame, Method>& pass, image_gradients const& image,
                    gaussians_view<float> gradients, span<float const> error = {}) {

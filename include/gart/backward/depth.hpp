@@ -3,7 +3,7 @@
 /// The needs of the gradient of an image's depth, besides those of its colour (backward/terms.hpp). Depth is composited
 /// as a fourth channel whose colour is a hit's t. So the gradient of alpha needs the depth that the pixel would have if
 /// the hit were opaque. That is one float a slot, in an array beside the hit buffer, at the slot's number. The gradient
-/// by the transmittance comes with it at no cost a hit: it is that of a channel of the background alone.
+/// by the transmittance costs a hit nothing more. It is that of a channel which only the background has.
 
 #include <gart/backward/hit_layout.hpp>
 #include <gart/render/record.hpp>
@@ -12,8 +12,8 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// Depth and transmittance of an image and the gradients by them, for kernels: [H][W] each, null where there is no such
-/// gradient.
+/// Depth and transmittance of an image and the gradients by them, for kernels. Each is [H][W]; null where there is no
+/// such gradient.
 struct depth_image {
   float const* depth = nullptr;                   ///< sum of weight * t
   float const* transmittance = nullptr;           ///< after the last hit

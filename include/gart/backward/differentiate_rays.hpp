@@ -6,11 +6,11 @@
 ///   frame.render({.color = color});
 ///   differentiate_rays(frame, color, {.color = color_gradient}, {.direction = by_direction});
 ///
-/// what a lens is learned by (lens/differentiate_lens.hpp), a camera whose pixels each have a ray of their own, or rays
-/// that something in front of the camera bends. Every ray is walked once more as the pixel method does, with nothing to
-/// add to Gaussians: the sums stay with the ray. Colours turn with the ray's direction, and are in it
-/// (math/sh_turn.hpp). Hits, and so the gradient, are the forward pass's for every tracer and camera, through the
-/// filter of the pixels too. The gradient does not contain how the filter changes with a ray.
+/// Lenses are learned by it (lens/differentiate_lens.hpp). It also serves cameras with a ray of its own for each pixel.
+/// So it does where something in front of the camera bends rays. Every ray is walked once more, as the pixel method
+/// does. Its sums stay with the ray; Gaussians get none. Colours turn with the ray's direction, and are in it
+/// (math/sh_turn.hpp). Hits are those of the forward pass, for every tracer and camera, and through the pixels' filter.
+/// The gradient is of these hits. The gradient does not contain how the filter changes with a ray.
 ///
 /// A direction is a unit, and its gradient stands across it. The step at a hit's threshold has no gradient.
 ///

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// A method and those that it falls back to, so that a step can be done in the memory there is.
+/// A method and those that it falls back to. The first that fits into memory does the step.
 ///
 ///   backward_passes<frame<E, Traits, Tracer>, primitive_method> passes(exec);
 ///   passes.with_room(frame, byte_budget, [&](auto& pass) { pass.render(frame, targets); ... });

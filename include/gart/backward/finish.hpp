@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The last step of the backward pass turns the moments of each Gaussian into the gradients of its mean, log-scale,
-/// quaternion and opacity (math/hit_gradient.hpp). Where pixels have a filter, it goes back through that.
+/// The last step of the backward pass turns the moments of each Gaussian into gradients (math/hit_gradient.hpp). They
+/// are by its mean, log-scale, quaternion and opacity. Where pixels have a filter, it goes back through that.
 
 #include <gart/camera/models.hpp>
 #include <gart/core/span.hpp>

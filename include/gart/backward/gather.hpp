@@ -1,10 +1,10 @@
 #pragma once
 /// \file
-/// The backward pass by primitive: a team takes a tile, its lanes take the primitives of the tile's list in turn. A
-/// lane walks the pixels that the primitive's box and the tile share. It reads the record of the forward pass there,
-/// sums the gradient in registers and adds it to the Gaussian once. Rays and their SH bases are computed once a tile,
-/// into scratch. This is the plain form, for tiles of any size: what backward/packet_gather.hpp on a host and
-/// backward/matrix_gather.hpp on a device compute in theirs.
+/// The backward pass by primitive. A team takes a tile; its lanes take the primitives of the tile's list in turn. A
+/// lane walks the pixels that the primitive's box and the tile share. There it reads the record of the forward pass and
+/// sums the gradient in registers. It adds the sum to the Gaussian once. Rays and their SH bases are computed once a
+/// tile, into scratch. This is the plain form, for tiles of any size. backward/packet_gather.hpp computes the same on a
+/// host, backward/matrix_gather.hpp on a device.
 ///
 /// The slot tells whether it is a hit (backward/hit_slot.hpp). The function that the forward pass used evaluates t,
 /// offset and alpha again, so they are the same bits.
@@ -45,8 +45,8 @@ struct gather_kernel {
 
   static constexpr bool central = C::rays::central;  ///< whether all rays begin at the frame's origin
 
-  /// The values of a pixel that a lane needs: direction and (colour . gradient), gradient, SH basis. Records are an odd
-  /// number of 16-byte words apart where they can be, so that lanes on neighbouring pixels read different banks.
+  /// The values of a pixel that a lane needs: direction and (colour . gradient), gradient, SH basis. Where possible,
+  /// records are an odd number of 16-byte words apart. Lanes on neighbouring pixels then read different banks.
   struct pixel_data {
     /// Of degree 0 it is a constant.
     static constexpr int basis_quads = !C::terms::color || C::sh_degree == 0 ? 0 : (bands + 3) / 4;

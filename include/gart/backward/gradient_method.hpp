@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// A gradient method says what the forward pass records of a hit, which terms of the gradient are gathered by
-/// primitive, and which are scattered by pixel. It derives from gradient_method_base, which has defaults. A program
+/// A gradient method says what the forward pass records of a hit. It also says which terms of the gradient are gathered
+/// by primitive and which are scattered by pixel. It derives from gradient_method_base, which has defaults. A program
 /// static_asserts `gradient_method` of its own where it defines it; a misspelt name is found there.
 
 #include <gart/backward/terms.hpp>
@@ -12,8 +12,8 @@
 namespace gart { inline namespace GART_ISA {
 
 /// How a slot that no hit wrote is told from a hit. `cleared`: the buffer holds NaN before every forward pass.
-/// `recomputed`: the same function evaluates each pixel of a box again, and compares it with the last hit of its ray.
-/// The decision is the same, bit for bit, and nothing is cleared. It measured better on a device and on a host
+/// `recomputed`: the forward pass's function evaluates each pixel of a box again, and compares it with its ray's last
+/// hit. The decision is the same, bit for bit, and nothing is cleared. It measured better on a device and on a host
 /// (docs/backward.md).
 enum class slot_validity { cleared, recomputed };
 

@@ -61,8 +61,8 @@ struct deterministic_method : primitive_method {
   static constexpr bool ordered = true;                 ///< by a second launch
 };
 
-/// A method with gradients of the image's depth and transmittance too (backward/depth.hpp): a float a slot more, where
-/// geometry is gathered.
+/// A method that also has gradients by the image's depth and transmittance (backward/depth.hpp). Where geometry is
+/// gathered it takes a float a slot more.
 template <class Method>
 struct with_depth : Method {
   /// With the depth beside each slot.

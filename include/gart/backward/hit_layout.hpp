@@ -2,8 +2,8 @@
 /// \file
 /// Where the slot of (primitive, tile, pixel) lies in the hit buffer: primitive-major, then tile, then pixel,
 ///   idx(i, t, p) = O_primitive(i) + O_tile(i, t) + O_pixel(i, t, p).
-/// O_primitive is a prefix sum of box areas in 64 bits. The rest is a closed form of the box: its tiles are its cells
-/// cut by the grid's lines, row by row. Each holds its pixels row by row. A bijection onto [0, sum of areas).
+/// O_primitive is a prefix sum of box areas in 64 bits. The rest is a closed form of the box. The grid's lines cut it
+/// into tiles, row by row. Each holds its pixels row by row. A bijection onto [0, sum of areas).
 
 #include <gart/tiles/footprint_slots.hpp>
 
@@ -11,7 +11,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// Slots of the box before tile cell `cell` (the box cut by the tile): whole rows of cells above, cells to the left.
+/// Slots of the box before `cell`, its part in a tile. They are whole rows of cells above, and cells to the left.
 GART_HD constexpr u32 tile_offset(footprint_slots const& range, pixel_box const& cell) {
   pixel_box const& box = range.box;
   return (u32{cell.y0} - box.y0) * box.width() + (cell.x0 + range.columns_past(cell.x1) - box.x0) * cell.height();
@@ -57,7 +57,7 @@ struct alignas(16) tile_slots {
 template <int Size>
 GART_HD constexpr pixel_box cell_of(footprint_slots const& range, u32 x, u32 y) {
   u32 const tx = x / Size * Size, ty = y / Size * Size, seam = static_cast<u32>(range.seam);
-  // A tile of the image's last columns is cut off there: at the seam, or where the box ends before it.
+  // A tile of the image's last columns ends at the seam, or where the box ends before it.
   u32 const last = x < range.box.x0 ? tx + Size : seam > 0 ? seam : u32{range.box.x1};
   u32 const x1 = last < tx + Size ? last : tx + Size;
   return cell_in(range, {static_cast<u16>(tx), static_cast<u16>(ty), static_cast<u16>(x1),

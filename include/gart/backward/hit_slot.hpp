@@ -1,18 +1,19 @@
 #pragma once
 /// \file
-/// The content of a slot of the hit buffer, one struct a format: the forward pass packs (of), the gather unpacks. The
-/// gradient of alpha needs V, the colour that the pixel would have if the hit were opaque (math/hit_gradient.hpp). The
-/// gradient of colour needs the weight w = T alpha, and for each channel of the hit's colour whether it was clamped at
-/// zero.
+/// The content of a slot of the hit buffer, one struct a format. The forward pass packs it (of), the gather unpacks it.
+/// The gradient of alpha needs V, the colour that the pixel would have if the hit were opaque (math/hit_gradient.hpp).
+/// The gradient of colour needs the weight w = T alpha. It also needs to know which channels of the hit's colour were
+/// clamped at zero.
 ///   float4   16 bytes  V, whose free sign bits hold the clamps; w
 ///   half      8 bytes  the same in four halves: V within 2^-11 relatively (2^-25 absolutely), at most 65504; 2^15 w,
 ///                      so that a weight keeps its 2^-11 down to 2e-9
 ///   weight    4 bytes  w, whose three lowest bits hold the clamps (a relative error of 2^-20); no V: enough for the
 ///                      gradient of colour (hybrid)
 /// The gradient of alpha is the difference of V and the pixel's colour, over 1 - alpha. An error of V counts the more,
-/// the less of the ray the hit and those behind it are. Relative errors of a whole gradient, group by group, against
-/// double, at most (tests/traits): float4 5e-4 and half 1e-2 on clouds and long rays; on stacks of hits at the clamp
-/// 5e-4 and 0.15. Slots that no hit wrote keep the bits of the clear, all set; `written` tells them.
+/// the less of the ray the hit and those behind it are. These are bounds of relative errors against double, of each
+/// group of a whole gradient (tests/traits). On clouds and long rays they are 5e-4 for float4 and 1e-2 for half. On
+/// stacks of hits at the clamp they are 5e-4 and 0.15. Slots that no hit wrote keep the bits of the clear, all set;
+/// `written` tells them.
 
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
@@ -71,7 +72,8 @@ struct alignas(16) hit_entry {
 /// The format half.
 struct alignas(8) half_hit_entry {
   static constexpr char const* name = "half";  ///< in configurations and reports
-  u32 rg, bw;  ///< r in the low half of rg, b in that of bw, the weight in its high half; sign bits of r, g, b: clamped
+  /// r in the low half of rg, b in that of bw, the weight in its high half. Sign bits of r, g, b: clamped.
+  u32 rg, bw;
 
   /// As hit_entry::of.
   GART_HD GART_INLINE static half_hit_entry of(vec3 const& v, float weight, vec3 const& c) {

@@ -4,7 +4,7 @@
 /// time, two a lane. What primitives sum up for colour is a product for each channel c,
 ///   sum[band][primitive] = Y[band][pixel] (w g_c)[pixel][primitive],
 ///   w = 0 where the channel is clamped or no hit is,
-/// so it is left to the matrix units (math/matrix_unit.hpp): a lane holds the weights where they want them, and no SH
+/// so the matrix units compute it (math/matrix_unit.hpp). A lane holds the weights where the units want them, and no SH
 /// sum of its own. Moments are summed in registers and added up over the four lanes. Neighbouring lanes read
 /// neighbouring slots and add to neighbouring floats. Slots are copied to shared memory two rows ahead, which hides the
 /// latency of memory and takes no registers.
@@ -101,7 +101,7 @@ struct matrix_gather : gather_kernel<detail::without_color<C>> {
     }
   }
 
-  // Ids and cells of the primitives listed, by the first and the last of the tile's rows that they have: a counting
+  // Sorts ids and cells of the listed primitives by the first and the last of their rows in the tile. It is a counting
   // sort.
   __device__ GART_INLINE void put_in_order(auto const& team, scratch& s, pixel_box const& area, u32 const* list,
                                            u32 listed) const {

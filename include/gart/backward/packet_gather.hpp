@@ -1,7 +1,8 @@
 #pragma once
 /// \file
 /// The gather on a host does what gather_kernel does (backward/gather.hpp). It takes the pixels of a tile in packets, a
-/// lane a pixel (math/lanes.hpp), and a Gaussian's SH sums a lane a band. Sums are of the same terms in another order.
+/// lane a pixel (math/lanes.hpp). For a Gaussian's SH sums a lane is a band. Sums are of the same terms in another
+/// order.
 
 #include <gart/backward/gather.hpp>
 #include <gart/backward/packet_slots.hpp>
@@ -130,7 +131,7 @@ struct packet_gather {
 #pragma GCC unroll 16
     for (int k = 0; k < moment_count; ++k) moment_sum[k] = 0.0f;
 
-    // All packets are evaluated before the first is summed up: one is a chain of steps whose latency the others hide.
+    // All packets are evaluated before the first is summed up. Each is a chain of steps, whose latency the others hide.
     struct {
       ray_peak_of<lanes> r;
       lane_mask hit;

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The record of a hit by the methods primitive and hybrid: a slot (backward/hit_slot.hpp) at its place in the hit
-/// buffer (backward/hit_layout.hpp). The 3DGART paper calls the buffer LT.
+/// The record of a hit by the methods primitive and hybrid: a slot (backward/hit_slot.hpp) of the hit buffer.
+/// backward/hit_layout.hpp has its place. The 3DGART paper calls the buffer LT.
 
 #include <gart/backward/hit_layout.hpp>
 #include <gart/backward/hit_slot.hpp>

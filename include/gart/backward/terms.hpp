@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The two parts of a hit's gradient, and which of them a pass computes: colour (3 K floats of SH) and geometry (10
-/// moments). Geometry is of the image's colour alone, or of its depth too.
+/// The two parts of a hit's gradient: colour (3 K floats of SH) and geometry (10 moments). A pass computes one or both.
+/// Geometry is of the image's colour alone, or of its depth too.
 
 #include <gart/core/isa.hpp>
 

@@ -83,7 +83,7 @@ GART_HD GART_INLINE void cut_by_planes(beam_depths<F>& depths, beam const& b, in
   depths.cut(b, k, lower * step + a.origin, upper * step + a.origin, fabsf(a.origin) + 255.0f * step);
 }
 
-/// Whether a beam may cross child c at a depth of at least `near`; entry: no ray enters it before that distance.
+/// Whether a beam may cross child c at a depth of at least `near`. `entry`: no ray enters it before that distance.
 GART_HD GART_INLINE bool crosses_child(bvh_node const& n, int c, beam const& b, float near, float& entry) {
   beam_depths<float> depths{near, infinity};
   GART_UNROLL

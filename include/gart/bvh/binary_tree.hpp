@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// The binary tree that a wide one is made from (Karras, "Maximizing parallelism in the construction of BVHs, octrees,
-/// and k-d trees", HPG 2012). Boxes are sorted by the Morton codes of their centres. One thread makes an inner node;
-/// boxes are fitted from the leaves up. Codes are made for the bulk of the centres: one far away would leave the others
-/// few bits. As they are fitted it is also worked out which nodes become wide ones (bvh/shares.hpp).
+/// The binary tree that a wide one is made from. Source: Karras, "Maximizing parallelism in the construction of BVHs,
+/// octrees, and k-d trees", HPG 2012. Boxes are sorted by the Morton codes of their centres. One thread makes an inner
+/// node; boxes are fitted from the leaves up. Codes are made for the bulk of the centres: one far away would leave the
+/// others few bits. As they are fitted it is also worked out which nodes become wide ones (bvh/shares.hpp).
 
 #include <gart/bvh/morton.hpp>
 #include <gart/bvh/shares.hpp>

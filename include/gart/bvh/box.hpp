@@ -30,7 +30,7 @@ GART_HD GART_INLINE box join(box const& a, box const& b) {
   return out;
 }
 
-/// The box, in the frame, of all points where the Gaussian can be hit: centre and half-extent h_k = c sqrt(sum_j (R_kj
+/// The box, in the frame, of all points where the Gaussian can be hit. Its half-extent is h_k = c sqrt(sum_j (R_kj
 /// s_j)^2), c^2 the cutoff. Evaluating a hit in float moves it by a few roundings of the distance to the frame. The box
 /// is widened by 32 of them, so no candidate just outside its own box is missed.
 template <class Response = generalized_gaussian<>>

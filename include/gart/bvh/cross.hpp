@@ -82,10 +82,10 @@ GART_HD GART_INLINE float plane_number(u32 q) {
 #endif
 }
 
-/// A node's grid along a ray: it crosses plane q of axis k at plane_number(q) * step[k] + enter[k], or + leave[k] on
-/// the way out. The two lie apart by more than all roundings of either: a few of the distance to the far end of the
-/// grid, and on a device 2^-9 of a step. What overflows ends as an infinity on the safe side or as no number, and that
-/// prunes nothing.
+/// A node's grid along a ray. Where the ray enters, it crosses plane q of axis k at plane_number(q) * step[k] +
+/// enter[k]. Where it leaves, at plane_number(q) * step[k] + leave[k]. The two lie apart by more than all roundings of
+/// either. These are a few roundings of the distance to the far end of the grid. On a device there are also 2^-9 of a
+/// step. What overflows ends as an infinity on the safe side or as no number, and that prunes nothing.
 struct grid_crossing {
   float step[3], enter[3], leave[3];  ///< a number an axis
 
@@ -128,7 +128,8 @@ GART_HD GART_INLINE bvh_node load_bounds(bvh_node const& n) {
 GART_HD GART_INLINE bvh_node const& load_bounds(bvh_node const& n) { return n; }
 #endif
 
-/// The children that the ray crosses somewhere in [near, far], a bit each; entry: where it enters them, at least near.
+/// The children that the ray crosses somewhere in [near, far], a bit each. `entry`: where it enters them, at least
+/// near.
 #if !defined(__CUDACC__) && defined(__AVX2__)
 /// A child is a lane. Intrinsics stand where GCC finds no vector code for the language's words.
 GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, float near, float far, float (&entry)[bvh_width]) {

@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// One node of the wide tree: up to bvh_width children. Their boxes have 8 bits a side on the node's own grid (Ylitie,
-/// Karras and Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs", HPG 2017).
+/// One node of the wide tree: up to bvh_width children. Their boxes have 8 bits a side on the node's own grid. Source:
+/// Ylitie, Karras and Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs", HPG 2017.
 ///
-/// Plane q of an axis lies at origin + q * step. The step is a power of two and the origin a multiple of it, so every
+/// Plane q of an axis lies at origin + q * step. The step is a power of two and the origin a multiple of it. So every
 /// plane is exactly a float. Sides are rounded outward: a box lies in its child_box, whatever its size and place. An
 /// axis with a side beyond 2^126, or one that is not a number, has planes for "below 0", 0 and "above 0" only.
 ///
@@ -90,7 +90,7 @@ GART_HD GART_INLINE bvh_axis axis_between(float lo, float hi) {
   }
 }
 
-/// The planes that hold [lo, hi], which lies within the axis's range; a side that is not a number holds all.
+/// The planes that hold [lo, hi], which lies within the axis's range. A side that is not a number holds all.
 GART_HD GART_INLINE u32 plane_below(bvh_axis const& a, float lo) {
   if (a.exponent == bvh_axis::unbounded) return lo >= 0.0f ? 1 : 0;
   float const step = a.step(), per_step = bits_to_float((254 - a.exponent) << 23);

@@ -2,8 +2,8 @@
 /// \file
 /// Chooses the nodes of a binary tree that become wide ones, so that rays cross the fewest wide nodes. A node's chance
 /// to be crossed is the area of its box (Ylitie, Karras and Laine 2017, section 3). From the leaves up, a node finds
-/// the cost of handing 1, 2, ... children to the wide node above: itself as a wide node, or what its two sides hand on,
-/// each its share. From the root down the shares are dealt out.
+/// the cost of handing 1, 2, ... children to the wide node above. It hands on itself as a wide node, or what its two
+/// sides hand on, each its share. From the root down the shares are dealt out.
 
 #include <gart/bvh/node.hpp>
 

@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// Triangles under the tree: the nearest that a ray meets, or whether there is any. Watertight: a ray between two
-/// triangles that share an edge, or through their corner, meets one of them (Woop, Benthin and Wald, "Watertight
-/// ray/triangle intersection", JCGT 2013). Triangles without an area, or with a corner that is not finite, are never
-/// met.
+/// Triangles under the tree: the nearest that a ray meets, or whether there is any. The test is watertight. A ray
+/// between two triangles that share an edge, or through their corner, meets one of them. Source: Woop, Benthin and
+/// Wald, "Watertight ray/triangle intersection", JCGT 2013. Triangles without an area, or with a corner that is not
+/// finite, are never met.
 ///
 /// Both sides count. Of equally near ones the first is met, so that the order of the tree decides nothing.
 /// Cost: a walk of the tree; 36 bytes a triangle beside it.
@@ -60,7 +60,7 @@ struct sheared_ray {
   }
 };
 
-/// Whether the ray meets the triangle in (near, hit.t), or at hit.t as one of a lower number; sets the hit.
+/// Whether the ray meets the triangle in (near, hit.t), or at hit.t where its number is lower. Sets the hit.
 GART_HD GART_INLINE bool meets(triangle const& t, u32 id, sheared_ray const& r, float near, triangle_hit& hit) {
   vec3 const a = r.sheared(t.corner[0]), b = r.sheared(t.corner[1]), c = r.sheared(t.corner[2]);
   // Products are rounded before they are subtracted: seen from the neighbour, an edge has the same number negated.

@@ -68,7 +68,7 @@ GART_HD GART_INLINE u32 near_to_far(u32 wanted, float const (&entry)[bvh_width])
 template <class Ray, class Visitor>
 GART_HD GART_INLINE void walk(bvh_view const& tree, Ray const& r, Visitor& visitor) {
   if (tree.count == 0) return;
-  // 63 bits of code and at most 32 of position bound the depth; a level leaves at most one node with children to enter.
+  // 63 bits of code and at most 32 of position bound the depth. A level leaves at most one node with children to enter.
   constexpr int depth = 96;
   struct {
     u32 node, order;

@@ -1,11 +1,11 @@
 #pragma once
 /// \file
-/// The filter of the pixels of a camera whose pixels' solid angle depends on the angle with an axis alone
-/// (render_options.antialias). It is a Gaussian; its standard deviation is so many pixels times the root of a pixel's
-/// solid angle times the distance. Beyond the largest angle it goes on as there. The square of the solid angle is a
-/// table of 64 straight lines over (1 - cosine) / 2. In this variable it is smooth on the axis and at poles. Images and
-/// gradients follow the table; a mean's gradient is within 0.002 of the curve's. Fixed arithmetic where it is made: the
-/// same bits on every policy.
+/// The pixels' filter (render_options.antialias) of a camera whose pixels' solid angle depends only on the angle with
+/// an axis. It is a Gaussian. Its standard deviation is so many pixels times the root of a pixel's solid angle times
+/// the distance. Beyond the largest angle it goes on as there. The square of the solid angle is a table of 64 straight
+/// lines over (1 - cosine) / 2. In this variable it is smooth on the axis and at poles. Images and gradients follow the
+/// table; a mean's gradient is within 0.002 of the curve's. Fixed arithmetic where it is made: the same bits on every
+/// policy.
 
 #include <gart/math/widened.hpp>
 

@@ -1,12 +1,12 @@
 #pragma once
 /// \file
-/// The whole sphere: azimuth across the width, from behind over the right of the middle column to behind again, and the
-/// angle from straight up (-y) down the height (COLMAP's and nerfstudio's EQUIRECTANGULAR),
+/// The whole sphere (COLMAP's and nerfstudio's EQUIRECTANGULAR). The width shows the azimuth, from behind over the
+/// right of the middle column to behind again. The height shows the angle from straight up (-y) down:
 ///   direction = (sin(phi) sin(theta), -cos(theta), cos(phi) sin(theta)),   phi = 2 pi (u / W - 1/2), theta = pi v / H.
 ///
 /// Boxes are exact in azimuth and all but exact in height (camera/seen_angles.hpp). A box that crosses the seam at the
-/// left and right border goes on past the width (footprint::seam). A box that holds a pole has all columns. Turning the
-/// camera half about its y axis rolls the image by half its width, bit by bit where the width is even.
+/// left and right border goes on past the width (footprint::seam). A box that holds a pole has all columns. Half a turn
+/// of the camera about its y axis rolls the image by half its width. Where the width is even, it does so bit by bit.
 
 #include <gart/camera/radial_lens.hpp>
 

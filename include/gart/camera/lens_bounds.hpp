@@ -1,21 +1,21 @@
 #pragma once
 /// \file
-/// Boxes of ellipsoids through a lens of any curve (camera/lens_curve.hpp). With v a direction in the
-/// ellipsoid's middle, its silhouette in the plane across v is an ellipse, exactly: the image coordinate u of a
-/// direction at the angle d from v, which lies in [a-, a+] along u's gradient there, is within
+/// Boxes of ellipsoids through a lens of any curve (camera/lens_curve.hpp). Let v be a direction in the ellipsoid's
+/// middle; the silhouette in the plane across v is an ellipse, exactly. Let u be an image coordinate of a direction at
+/// the angle d from v. Along u's gradient that direction lies in [a-, a+]. Then the coordinate is within
 ///   u(v) + |grad u| [a-, a+] +- K d^2 / 2,
 /// K the largest second derivative of u up to that angle from the axis. With the Hessian H of u = r(theta) cos(phi),
 ///   r'' cos(phi),   -(r' - r cot(theta)) / sin(theta) sin(phi),   (r' cot(theta) - r / sin^2(theta)) cos(phi),
-/// it is within the extremes of g s + s H s / 2 over that ellipse +- K3 d^3 / 6, K3 of third derivatives: a quadratic
-/// over an ellipse, bounded by its dual.
+/// it is within the extremes of g s + s H s / 2 over that ellipse +- K3 d^3 / 6, K3 of third derivatives. This is a
+/// quadratic over an ellipse, bounded by its dual.
 ///
 /// Where an ellipsoid is seen large d^3 is too much. There a polygon is put about that ellipse. Where the lens folds
-/// nowhere u has a gradient everywhere, so that it is most on the polygon's border, whose edges are arcs: on one of the
-/// angle l u is no more than at its ends and K l^2 / 8.
+/// nowhere, u has a gradient everywhere. So it is largest on the polygon's border, whose edges are arcs. On an arc of
+/// the angle l, u exceeds its values at the ends by at most K l^2 / 8.
 ///
-/// Derivatives are tabulated (camera/lens_image.hpp). All is cut by the image of the ring and the sector about the axis
-/// that the ellipsoid is seen in (camera/seen_angles.hpp), which alone remains where it surrounds the camera or reaches
-/// to where the lens says nothing. In double.
+/// Derivatives are tabulated (camera/lens_image.hpp). All is cut by the image of the ring and the sector that the
+/// ellipsoid is seen in (camera/seen_angles.hpp). That image alone remains where the ellipsoid surrounds the camera or
+/// reaches to where the lens says nothing. In double.
 
 #include <gart/camera/lens_image.hpp>
 #include <gart/camera/seen_angles.hpp>
@@ -30,8 +30,8 @@ namespace gart { inline namespace GART_ISA {
 /// A lens with what its boxes need. Host side made, trivially copyable.
 class lens_bounds : public lens_image {
  public:
-  /// The lens of a camera's size, focal lengths and principal point; without a pose or a near distance, for what does
-  /// not depend on these.
+  /// From a camera's size, focal lengths and principal point. It serves where neither a pose nor a near distance
+  /// matters.
   using lens_image::lens_image;
   /// With a pose and a near distance.
   lens_bounds seen_from(mat3 const& rotation, float near) const {
@@ -188,7 +188,7 @@ class lens_bounds : public lens_image {
     cut(u, x, gx1, gx2, cp, sp), cut(v, y, gy1, gy2, sp, -cp);
   }
 
-  // u and v cut by their values on a polygon about the silhouette f, which lies in the plane across w.
+  // Cuts u and v by their values on a polygon about the silhouette f, which lies across w.
   GART_HD void cut_by_polygon(flat_silhouette const& f, vec3d const& e1, vec3d const& e2, vec3d const& w, double error,
                               detail::interval& u, detail::interval& v) const {
     double const l11 = sqrt(f.h11), l21 = l11 > 0 ? f.h12 / l11 : 0.0, left = f.h22 - l21 * l21,
@@ -225,8 +225,8 @@ class lens_bounds : public lens_image {
   float near_ = 0;
 };
 
-/// Makes the bounds of a camera's lens. Their tables take milliseconds and views share lenses, so a program makes them
-/// once a lens and keeps the latest thousands. Host side.
+/// Makes the bounds of a camera's lens. Tables take milliseconds, and views share lenses. So a program makes them once
+/// a lens, and keeps the latest thousands. Host side.
 inline lens_bounds tabulated_bounds(camera_kind kind, distortion const& l, float fx, float fy, float cx, float cy,
                                     int width, int height) {
   static std::mutex guard;

@@ -1,15 +1,15 @@
 #pragma once
 /// \file
 /// The curve of a lens and its way back. A direction at the angle theta from the axis first has the distance q(theta)
-/// from it, by the kind of the lens:
+/// from it. Each kind of lens has its q:
 ///   perspective  q = tan theta
 ///   fisheye      q = theta
 ///   fov          q = atan2(b sin theta, cos theta) / omega,   b = 2 tan(omega / 2)
 ///   eucm         q = sin theta / (alpha sqrt(beta sin^2 theta + cos^2 theta) + (1 - alpha) cos theta)
 ///   division     q / (1 + k1 q^2) = tan theta
-/// then, with x = q (cos phi, sin phi) and R(q^2) = (1 + k1 q^2 + ... + k6 q^12) / (1 + d1 q^2 + d2 q^4 + d3 q^6), the
-/// image point, in units of the focal length about the principal point, is x R + T(x), or for fisheye624 y + T(y) of
-/// y = x R; with r the length of what it is of, T is
+/// Then let x = q (cos phi, sin phi) and R(q^2) = (1 + k1 q^2 + ... + k6 q^12) / (1 + d1 q^2 + d2 q^4 + d3 q^6). The
+/// image point is x R + T(x), for fisheye624 y + T(y) of y = x R. Its unit is the focal length, its origin the
+/// principal point. With r the length of its argument, T is
 ///   T_x = 2 p1 x y + p2 (r^2 + 2 x^2) + s1 r^2 + s2 r^4,   T_y = 2 p2 x y + p1 (r^2 + 2 y^2) + s3 r^2 + s4 r^4.
 /// All kinds go beyond 90 degrees but the perspective one, as far as they say something there.
 ///

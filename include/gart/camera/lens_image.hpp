@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// A lens of any curve (camera/lens_curve.hpp) as an image: where a direction lies on it, up to which angle, and how
-/// fast it changes there. Boxes follow from these (camera/lens_bounds.hpp). Tables of derivatives are running maxima by
-/// the angle with the axis, made on the host in milliseconds: 1.5 KiB.
+/// A lens of any curve (camera/lens_curve.hpp) as an image. It tells where a direction lies on it, up to which angle,
+/// and how fast it changes there. Boxes follow from these (camera/lens_bounds.hpp). Tables of derivatives are running
+/// maxima by the angle with the axis, made on the host in milliseconds: 1.5 KiB.
 
 #include <gart/camera/lens_curve.hpp>
 #include <gart/math/glm.hpp>
@@ -74,7 +74,7 @@ class lens_image {
   }
 
   GART_HD double end() const { return end_; }  ///< the angle up to which changes() are known
-  /// The angle up to which both image coordinates have a gradient everywhere, so that neither is most inside of a
+  /// The angle up to which both image coordinates have a gradient everywhere. Neither then has its maximum inside a
   /// region.
   GART_HD double unfolded() const { return unfolded_; }
   /// Up to an angle that is less than end().
@@ -184,8 +184,8 @@ class lens_image {
     return end_;
   }
 
-  // For an image coordinate distance(theta) cos(phi), whatever phi: bounds of its derivatives along a line of sight
-  // that turns from that angle in any direction.
+  // Bounds of the derivatives of an image coordinate distance(theta) cos(phi), whatever phi. They are along a line of
+  // sight that turns from that angle in any direction.
   struct differences {
     double value = 0, first = 0, second = 0, third = 0;
   };

@@ -1,14 +1,12 @@
 #pragma once
 /// \file
-/// How a ray changes as its image point moves: this is needed to learn a focal length or a principal point. A camera
-/// that has these casts its rays by x = (u - cx) / fx and y = (v - cy) / fy alone, so that with the ray's derivatives
-/// by x and y
+/// How a ray changes as its image point moves. Learning a focal length or a principal point needs this. A camera with
+/// slopes casts its rays by x = (u - cx) / fx and y = (v - cy) / fy alone. With the ray's derivatives by x and y,
 ///   d ray / d cx = -(d ray / d x) / fx,   d ray / d fx = -x (d ray / d x) / fx,   and y likewise.
 /// A model says so by a member (camera/model.hpp)
 ///   slopes() const: a trivially copyable ray_slopes operator()(float u, float v, vec3 direction) const
-/// of the image point and its ray's direction in the world; lens_slopes is that of all whose lens is a curve of the
-/// angle with the axis, the pinhole and OpenCV's among them. It inverts the derivative of where the lens sends a
-/// direction, so that no ray is cast again.
+/// of the image point and its ray's direction in the world. lens_slopes serves all whose lens is a curve of the angle
+/// with the axis, the pinhole and OpenCV's too. It inverts the derivative of the lens, so no ray is cast again.
 
 #include <gart/camera/lens_curve.hpp>
 #include <gart/camera/model.hpp>

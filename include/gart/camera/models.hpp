@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The camera models, and the one place that goes from a run-time camera to its model: visit_camera(view, f) calls f
-/// with the model. A view that is a model already is passed on (camera/model.hpp).
+/// The camera models. visit_camera(view, f), which calls f with the model, is the one place that turns a run-time
+/// camera into its model. A view that is a model already is passed on (camera/model.hpp).
 ///
 /// Errors: require_camera throws invalid_argument for a camera by which no ray can be cast; everything that renders
 /// calls it.

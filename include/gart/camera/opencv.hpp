@@ -1,12 +1,12 @@
 #pragma once
 /// \file
-/// A pinhole with radial-tangential distortion (COLMAP's SIMPLE_RADIAL, RADIAL and OPENCV): u = fx x_d + cx with, for
-/// the undistorted (x, y) = (X/Z, Y/Z) and r2 = x*x + y*y,
+/// A pinhole with radial-tangential distortion (COLMAP's SIMPLE_RADIAL, RADIAL and OPENCV). It has u = fx x_d + cx
+/// with, for the undistorted (x, y) = (X/Z, Y/Z) and r2 = x*x + y*y,
 ///   x_d = x (1 + k1 r2 + k2 r2^2) + 2 p1 x y + p2 (r2 + 2 x x),  y_d likewise with p1 and p2 exchanged;
 /// a ray inverts it by Newton's method (camera/undistort.hpp).
 ///
-/// A box is that of any curve of the angle with the axis (camera/lens_bounds.hpp). For a Gaussian that is seen large,
-/// or crosses the near plane, the rectangle of slopes is mapped to the image edge by edge. The map is one to one where
+/// A box is that of any curve of the angle with the axis (camera/lens_bounds.hpp). A Gaussian may be seen large, or
+/// cross the near plane. Then the rectangle of slopes is mapped to the image edge by edge. The map is one to one where
 /// the image is. So the image of the rectangle lies within the image of its border. The border is sampled, and widened
 /// by the bulge of a curved edge between samples.
 

@@ -4,8 +4,8 @@
 ///   u = fx x + cx,   v = fy y + cy,
 /// fx and fy in pixels a world unit (nerfstudio's ORTHOPHOTO). Hits lie in front of that plane.
 ///
-/// The box of an ellipsoid m + A s is m_x +- |A_x|, exactly. Where it crosses the plane at `near`, the part in front
-/// counts: the extreme of the section, an ellipse, takes the place of an extreme behind it.
+/// The box of an ellipsoid m + A s is m_x +- |A_x|, exactly. Where it crosses the plane at `near`, only the part in
+/// front counts. The extreme of the section, an ellipse, takes the place of an extreme behind the plane.
 
 #include <gart/camera/lens_slopes.hpp>
 #include <gart/camera/model.hpp>
@@ -39,7 +39,7 @@ struct orthographic_bounds {
   }
 
  private:
-  // Of x over what of the ellipsoid has z >= n; (mx, ax): centre and row of the axis, (mz, az): of depth.
+  // The extent in x of the part of the ellipsoid with z >= n. (mx, ax): centre and row of the axis, (mz, az): of depth.
   GART_HD static detail::interval extent(double mx, vec3d const& ax, double mz, vec3d const& az, double n) {
     double const half = glm::length(ax), zz = glm::dot(az, az), xz = glm::dot(ax, az);
     detail::interval out;

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The weights of a camera's pixels in training: those of the whole sphere by their solid angle, pixels without a ray
-/// zero. Host side; a byte a pixel, in parts of 255.
+/// The weights of a camera's pixels in training. Pixels of the whole sphere count by their solid angle, pixels without
+/// a ray not at all. Host side; a byte a pixel, in parts of 255.
 
 #include <gart/camera/models.hpp>
 #include <gart/scene/image.hpp>

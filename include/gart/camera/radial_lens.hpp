@@ -1,10 +1,10 @@
 #pragma once
 /// \file
 /// A camera whose lens is a curve of the angle with its axis (camera/lens_curve.hpp), with tangential and thin prism
-/// terms: fisheyes, FOV, EUCM, the division models and FULL_OPENCV. Its view may pass 180 degrees.
+/// terms. These are fisheyes, FOV, EUCM, the division models and FULL_OPENCV. Its view may pass 180 degrees.
 ///
-/// The lens gives some pixels no ray: those outside its image circle, or past where the distance from the axis stops
-/// growing with the angle. Their direction is zero. Such a ray hits nothing, shows the background and has no weight in
+/// The lens gives some pixels no ray. They lie outside its image circle, or where the distance from the axis no longer
+/// grows with the angle. Their direction is zero. Such a ray hits nothing, shows the background and has no weight in
 /// training (camera/pixel_weights.hpp). Rays are worked out in double of fixed rounding: the same bits everywhere.
 
 #include <gart/camera/axial_filter.hpp>

@@ -2,8 +2,8 @@
 /// \file
 /// How near a hit lies, the order of tile lists: distance times a factor of the ray's direction,
 ///   depth = t (direction . axis + offset).
-/// The default is the distance itself, an order for rays of any directions; a pinhole's is z, which its bounds are
-/// tighter in.
+/// The default is the distance itself, an order for rays of any directions. A pinhole takes z, in which its bounds are
+/// tighter.
 
 #include <gart/core/macros.hpp>
 #include <gart/math/glm.hpp>

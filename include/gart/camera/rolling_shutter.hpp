@@ -5,9 +5,9 @@
 ///
 /// Box: while some lines are exposed, the ellipsoid moves within one larger ellipsoid in the camera's axes. The lens
 /// bounds the larger one. Only the lines of the lens's box can hit it, and the same holds again over these. Each round
-/// is conservative, and the lines of a small ellipsoid are few. With c(s) its centre and A(s) its axes as the camera
-/// has them at time s, over [s - h, s + h]: q = h c'(s), and e what c and A are at most off by otherwise, rotation and
-/// second order,
+/// is conservative, and the lines of a small ellipsoid are few. Let c(s) be its centre and A(s) its axes in the
+/// camera's axes, at times within h of s. Let q = h c'(s). Let e be the largest other change of c and A, by rotation
+/// and second order. Then
 ///   C' = (1 + k2) [(1 + k1) A A^T + (1 + 1/k1) e^2] + (1 + 1/k2) q q^T,
 /// the outer ellipsoid of a Minkowski sum, for any k1, k2 > 0.
 
@@ -53,7 +53,7 @@ struct rolling_bounds {
   static constexpr int most_rounds = 8;
 
   // Whether the camera is within what `over` returns, whose axes are a triangle's. Where hits lie in front of such a
-  // camera depends on the ellipsoid itself, and says nothing of a smaller one inside.
+  // camera depends on the ellipsoid itself. It says nothing of a smaller one inside.
   GART_HD static bool around_camera(ellipsoid const& e) {
     double const x = e.center.x / e.axes[0].x, y = (e.center.y - e.axes[0].y * x) / e.axes[1].y,
                  z = (e.center.z - e.axes[0].z * x - e.axes[1].z * y) / e.axes[2].z;
@@ -68,7 +68,7 @@ struct rolling_bounds {
     return out;
   }
 
-  // All that it is in the axes of the middle of the read-out while the lines between these places are exposed.
+  // All that the ellipsoid covers while the lines between these places are exposed, in the axes of mid read-out.
   GART_HD ellipsoid over(ellipsoid const& e, double first, double end) const {
     double s = lines.template time_at<double>(0.5 * (first + end), 0.5 * (first + end));
     double const h = 0.5 * (end - first) / lines.count, speed = glm::length(travel), spin = glm::length(turn);

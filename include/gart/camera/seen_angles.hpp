@@ -1,8 +1,9 @@
 #pragma once
 /// \file
-/// The angles under which an ellipsoid m + A s, |s| <= 1, is seen, from its centre m and its covariance C = A A^T in a
-/// camera's axes. The boxes of lenses and of the sphere are made of these. In a plane through the camera the ellipsoid
-/// is an ellipse with two exact tangents. About an axis there are first the angles round it, then those with it.
+/// The angles under which a camera sees an ellipsoid m + A s, |s| <= 1. They follow from its centre m and covariance C
+/// = A A^T in the camera's axes. The boxes of lenses and of the sphere are made of these. In a plane through the camera
+/// the ellipsoid is an ellipse with two exact tangents. About an axis there are first the angles round it, then those
+/// with it.
 ///
 /// All in double. C is widened by a ten millionth of the reach: flat ellipsoids keep an inside, and nothing cancels.
 
@@ -53,8 +54,8 @@ struct seen_ellipsoid {
   }
 };
 
-/// The ellipse of an ellipsoid's silhouette in the plane across a direction v, at the distance 1: its middle, and the
-/// matrix of its squared half-widths, along two axes there.
+/// The ellipse of an ellipsoid's silhouette in the plane across a direction v, at the distance 1. It has its middle and
+/// the matrix of its squared half-widths, along two axes there.
 struct flat_silhouette {
   double z1 = 0, z2 = 0;             ///< the middle
   double h11 = 0, h12 = 0, h22 = 0;  ///< half-widths squared
@@ -97,8 +98,8 @@ struct angle_range {
   bool all = false;  ///< every angle: the ellipse holds the camera
 };
 
-/// In the plane of two unit vectors that are across each other, counted from the centre's own direction there, from the
-/// first towards the second. With the ellipse's centre (a, b) and covariance C the tangents are
+/// In the plane of two orthogonal unit vectors. Angles count from the centre's own direction there, from the first
+/// vector towards the second. With the ellipse's centre (a, b) and covariance C the tangents are
 ///   sqrt(Q - det C) m +- J adj(C) m,   Q = m^T adj(C) m, J a quarter turn.
 GART_HD inline angle_range angles_in_plane(double a, double b, double aa, double ab, double bb) {
   double const det = aa * bb - ab * ab, square = a * a + b * b;

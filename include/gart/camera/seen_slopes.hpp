@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The slopes x / z and y / z that a camera's image sees: the rectangle about them, by sampling the image's border. For
-/// models that project slopes to the image. Host side, in double.
+/// The rectangle of slopes x / z and y / z that a camera's image sees, from samples of the image's border. For models
+/// that project slopes to the image. Host side, in double.
 
 #include <gart/core/isa.hpp>
 #include <gart/math/glm.hpp>

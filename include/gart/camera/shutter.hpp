@@ -1,11 +1,11 @@
 #pragma once
 /// \file
-/// The motion of a camera while its shutter goes over the image (scene/camera.hpp), from the poses of the first and the
-/// last line that are read, and back. Files have these poses. A camera holds its pose at the middle of the read-out,
-/// and its motion, in its own axes, while the shutter goes from border to border,
+/// The motion of a camera while its shutter goes over the image (scene/camera.hpp). It comes from the poses of the
+/// first and the last line that are read, and gives them back. Files have these poses. A camera holds its pose at the
+/// middle of the read-out. It also holds its motion, in its own axes, while the shutter goes from border to border:
 ///   rotation(s) = R exp(s [turn]x),   position(s) = p + s R travel,   -1/2 <= s <= 1/2:
-/// linear in translation, slerp in rotation. So a camera that is moved as a whole takes its motion along, and an image
-/// of another size has the same.
+/// linear in translation, slerp in rotation. So a camera that is moved as a whole takes its motion along. An image of
+/// another size has the same motion.
 
 #include <gart/math/turn.hpp>
 #include <gart/scene/camera.hpp>
@@ -67,8 +67,8 @@ inline line_poses poses_of_lines(camera const& view) {
   return {at_time(view, -half), at_time(view, half)};
 }
 
-/// A camera with a rolling shutter, from one with the pose of the first line that is read, and the pose of the last.
-/// The image must have a size, and two lines or more.
+/// A camera with a rolling shutter. `first` has the pose of the first line that is read, `last` that of the last. The
+/// image must have a size, and two lines or more.
 inline camera rolling_between(camera first, camera const& last, shutter_kind shutter) {
   first.shutter = shutter;
   int const lines = shutter_lines(first);

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The filter of the pixels of a camera that projects slopes (render_options.antialias): a Gaussian whose standard
-/// deviation at a point is so many pixels, as far as a pixel reaches there,
+/// The pixels' filter of a camera that projects slopes (render_options.antialias). It is a Gaussian. At a point its
+/// standard deviation is so many pixels, as far as a pixel reaches there:
 ///   r = pixels x angle of a pixel x distance,   angle = the square root of a pixel's solid angle,
 /// which for slopes x, y through a lens of Jacobian J (1 without one) is
 ///   angle^2 = (1 + x^2 + y^2)^-3/2 / (fx fy det J).

@@ -8,7 +8,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// The image point, in units of the focal length about the principal point, of the slopes x = X/Z and y = Y/Z.
+/// The image point of the slopes x = X/Z and y = Y/Z, in focal lengths from the principal point.
 GART_HD inline void distort(distortion const& lens, double x, double y, double& u, double& v) {
   double const r2 = x * x + y * y, radial = 1 + r2 * (lens.k1 + r2 * lens.k2);
   u = x * radial + 2 * lens.p1 * x * y + lens.p2 * (r2 + 2 * x * x);

@@ -2,16 +2,17 @@
 /// \file
 /// A channel: what a ray sums besides its colour, over hits that a table has (channels/hit_table.hpp),
 ///   S = sum over hits of w value + T beyond,
-/// w the weight of a hit, T what the last one lets through. A channel says three things of a hit: what it adds to the
-/// ray (add), what its weight is worth to the loss (worth), and what its Gaussian's parameters gain (pull). The passes
-/// do the rest, for any channel and any number of them: channels/sum.hpp forward, channels/differentiate.hpp back.
+/// w the weight of a hit, T what the last one lets through. A channel says three things of a hit. What does it add to
+/// the ray (add)? What is its weight worth to the loss (worth)? What do its Gaussian's parameters gain (pull)? The
+/// passes do the rest, for any channel and any number of them: channels/sum.hpp forward, channels/differentiate.hpp
+/// back.
 ///
 /// Colour is the one channel that passes are fused with (render/composite.hpp, backward/): it decides nothing that
-/// these need. A new channel is a header here, with a member of the targets and gradients (rays/ray_batch.hpp)
-/// and a line in channels/passes.hpp.
+/// these need. A new channel is a header here. It has a member in the targets and gradients (rays/ray_batch.hpp) and a
+/// line in channels/passes.hpp.
 ///
-/// All channels of a backward pass share one walk of the hits: dL/dalpha needs the sum of their worths, not each. A
-/// channel costs a hit its numbers, read or added once; a wide one goes by chunks of `chunk` numbers.
+/// All channels of a backward pass share one walk of the hits. dL/dalpha needs only the sum of their worths. A channel
+/// costs a hit its numbers, read or added once; a wide one goes by chunks of `chunk` numbers.
 
 #include <gart/core/isa.hpp>
 #include <gart/core/macros.hpp>

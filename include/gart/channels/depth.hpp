@@ -1,6 +1,7 @@
 #pragma once
 /// \file
-/// The channels of a ray's depth, the sum of w t, and of its transmittance, which is one that only the background has.
+/// Two channels of a ray: its depth, the sum of w t, and its transmittance. The latter is a channel of the background
+/// alone.
 
 #include <gart/channels/channel.hpp>
 

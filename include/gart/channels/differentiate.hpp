@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The backward pass of channels over the hits of a table: from dL/d what rays summed to dL/d the channels' parameters,
-/// and to dL/d the Gaussians and the rays.
+/// The backward pass of channels over the hits of a table. From dL/d the rays' sums it computes dL/d the channels'
+/// parameters. It also computes dL/d the Gaussians and the rays.
 ///
 ///   channel_gradient<E> back(exec);
 ///   back.begin(table);
@@ -14,8 +14,9 @@
 /// by a walk of each ray from its end, so that no long sum is taken from another. Without add() and add_moments() a
 /// channel is detached from the geometry: pull() needs the weights alone.
 ///
-/// Memory: 4 bytes a hit and a ray, 4 more a hit with depth; the order by Gaussian, and a row of 32 numbers (128 on
-/// hosts) for each piece of its hits. Cost: the sort; a read of a channel's numbers for each hit in add() and pull().
+/// Memory: 4 bytes a hit and a ray, 4 more a hit with depth, and the order by Gaussian. Each piece of a Gaussian's hits
+/// takes a row of 32 numbers (128 on hosts). Cost: the sort; a read of a channel's numbers for each hit in add() and
+/// pull().
 
 #include <gart/channels/gaussian_order.hpp>
 #include <gart/channels/sum.hpp>

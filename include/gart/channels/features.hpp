@@ -8,8 +8,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// Chunk: numbers a lane; on a device neighbouring lanes take neighbouring chunks of one ray, so that rows are read
-/// whole.
+/// Chunk: numbers a lane. On a device neighbouring lanes take neighbouring chunks of one ray. So rows are read whole.
 template <int Chunk>
 struct feature_channel : channel_base {
   static constexpr int chunk = Chunk;  ///< numbers that one lane sums at a time

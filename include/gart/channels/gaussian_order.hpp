@@ -31,8 +31,8 @@ struct gaussian_order_view {
 
 namespace channel_kernels {
 
-// What a lane of a host reads of hits in this order lies anywhere: asked for some hits ahead, in two steps. By place:
-// prefetches what lies at a hit's place; by ray: what its ray has.
+// In this order a host's lane reads data that lie anywhere. So it prefetches them some hits ahead, in two steps. By
+// place: prefetches what lies at a hit's place; by ray: what its ray has.
 template <class ByPlace, class ByRay>
 GART_HD GART_INLINE void ask_ahead([[maybe_unused]] gaussian_order_view const& order, [[maybe_unused]] u32 k,
                                    [[maybe_unused]] ByPlace const& by_place, [[maybe_unused]] ByRay const& by_ray) {

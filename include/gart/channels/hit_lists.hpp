@@ -8,8 +8,7 @@
 
 namespace gart {
 
-/// The hits of all rays, one ray after the other and each ray's in order: those of ray r are [offsets[r], offsets[r +
-/// 1]).
+/// The hits of all rays, one ray after the other, each ray's in order. Those of ray r are [offsets[r], offsets[r + 1]).
 struct hit_lists {
   std::vector<u64> offsets;   ///< [R + 1]
   std::vector<u32> ids;       ///< Gaussians

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// Hits that are sorted by Gaussian, cut into pieces of one Gaussian each: a lane sums a piece, then the pieces of a
+/// Hits that are sorted by Gaussian, cut into pieces of one Gaussian each. A lane sums a piece; then the pieces of a
 /// Gaussian are added up in order. Nothing is atomic; bits are the same in every run. Memory: 20 bytes a Gaussian and 4
 /// a piece. The host reads how many pieces there are.
 

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// The hits of rays in memory of a policy, as lists: those of ray r are [offsets[r], offsets[r + 1]), in order. What a
-/// ray program gives to a hit_writer, of a batch (rays/batch_composite.hpp) or of a view's pixels
-/// (channels/pixel_hits.hpp): exactly the hits that are composited.
+/// The hits of rays in memory of a policy, as lists: those of ray r are [offsets[r], offsets[r + 1]), in order. They
+/// are exactly the hits that are composited. A ray program gives them to a hit_writer: that of a batch
+/// (rays/batch_composite.hpp) or of a view's pixels (channels/pixel_hits.hpp).
 ///
 /// Memory: 16 bytes a hit and 8 a ray; to be differentiated 4 and 24 more. Cost: a trace that writes them, and before
 /// it one that counts them where nobody has. Errors: out_of_memory for 2^32 hits and more.
@@ -36,7 +36,7 @@ struct hit_table_view {
   GART_HD GART_INLINE listed_hit at(u64 k) const { return at(k, rays[k]); }
 };
 
-/// Takes the hits of rays: counts them where it has no lists, else writes them to the places that the counts make.
+/// Takes the hits of rays. Without lists it counts them; else it writes them to the places that the counts make.
 struct hit_writer {
   /// A ray on its way.
   struct state {

@@ -1,8 +1,7 @@
 #pragma once
 /// \file
-/// The hits of a view's pixels as a table, by any tracer and camera and through the filter of the pixels: row-major, a
-/// ray a pixel. Rows that are not traced have none. Views with one centre are walked in packets on hosts, as images
-/// are.
+/// The hits of a view's pixels as a table, a ray a pixel, row-major. It takes any tracer and camera, and the pixels'
+/// filter. Rows that are not traced have none. Views with one centre are walked in packets on hosts, as images are.
 
 #include <gart/channels/hit_table.hpp>
 #include <gart/render/options.hpp>

@@ -4,8 +4,8 @@
 ///
 ///   sum_channel(exec, table.view(), feature_channel<chunk_of<E>>{{}, features}, out);   // [R][width]
 ///
-/// A lane sums a chunk of a ray's numbers; a launch takes the numbers that its lanes' chunks make, so that wide
-/// channels are several launches over the same lists. Cost a launch: 12 bytes a hit, and its numbers, read once.
+/// A lane sums a chunk of a ray's numbers. A launch takes the numbers of its lanes' chunks. So wide channels take
+/// several launches over the same lists. Cost a launch: 12 bytes a hit, and its numbers, read once.
 
 #include <gart/channels/hit_table.hpp>
 #include <gart/exec/parallel.hpp>
@@ -37,8 +37,8 @@ struct sum_hits {
   }
 };
 
-// f(first, last, lanes) for each launch over `width` numbers of so many rows, a lane a chunk: lanes that lie together,
-// as many as share what a host's caches and a device's warps have read of hits, and no more than 32 bits can number.
+// Calls f(first, last, lanes) for each launch over `width` numbers of so many rows, a lane a chunk. Lanes that lie
+// together share what a host's caches and a device's warps have read of hits. Their count fits in 32 bits.
 template <int Chunk, class F>
 void for_each_launch(index_t rows, int width, F&& f) {
   int const lanes = rows > 0xffffffffu / 8 ? 1 : Chunk > 8 ? 4 : 8;

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// What Gaussians, views and batches of rays have of each channel besides colour and depth: a line a channel in each of
-/// these, and its checks. Memory is the policy's.
-/// Errors: invalid_argument naming the member whose size disagrees, and what was asked for without being there.
+/// What Gaussians, views and batches of rays have of each channel besides colour and depth. Each has a line a channel;
+/// so have its checks. Memory is the policy's. Errors: invalid_argument naming the member whose size disagrees, and
+/// what was asked for without being there.
 
 #include <gart/core/span.hpp>
 #include <gart/scene/features.hpp>

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// Which rank has which Gaussian: by blocks of numbers, dealt out in turn. Gaussian number g (64 bits in the scene, 32
-/// in a rank's own rows) lies in block g / block, of rank g / block % ranks, and is row
+/// in a rank's own rows) lies in block g / block. Its rank is g / block % ranks, its row
 ///   g / block / ranks * block + g % block
 /// there. So rows of a rank are in the order of their numbers. Gaussians appended to the scene are appended to the
 /// ranks' arrays. Growth balances itself, and nothing is ever dealt out anew.

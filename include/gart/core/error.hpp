@@ -27,8 +27,7 @@ struct io_error : error {
       remedy;         ///< what to do, or empty
 };
 
-/// A request that this build or this machine cannot serve: a camera model, a backend, a configuration that is not
-/// instantiated.
+/// A request that this build or machine cannot serve: a camera model, a backend, a configuration that is not compiled.
 struct unsupported : error {
   using error::error;
 };

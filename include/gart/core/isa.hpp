@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// GART_ISA: the inline namespace of everything whose layout, bits or code depend on the instruction set of a host
-/// translation unit. -march decides the number of lanes (math/lanes.hpp), and whether a*b + c is one rounding
+/// GART_ISA: the inline namespace of everything that depends on a host translation unit's instruction set by layout,
+/// bits or code. -march decides the number of lanes (math/lanes.hpp), and whether a*b + c is one rounding
 /// (math/arith.hpp). nvcc's host compiler has no lanes. Objects of one program may differ in these. They would share
 /// inline functions, templates and types of one name, and all would use one object's. With the instruction set in the
 /// name each has its own.

@@ -15,9 +15,9 @@
 #define GART_INLINE inline __attribute__((always_inline))
 #endif
 
-// The body of a kernel, and the functions of its policy that it calls. Instantiated for one policy it calls that
-// policy's functions alone, which nvcc cannot see from a template and would warn of. It stands right before the
-// declaration, not behind `template <...>`: a tile kernel takes `auto const& team`.
+// The body of a kernel, and the functions of its policy that it calls. Instantiated for one policy, it calls only that
+// policy's functions. nvcc cannot see that from a template, and would warn. It stands right before the declaration, not
+// behind `template <...>`: a tile kernel takes `auto const& team`.
 #if defined(__CUDACC__)
 #define GART_KERNEL _Pragma("nv_exec_check_disable") __host__ __device__
 #else

@@ -112,8 +112,8 @@ class buffer {
   }
 
  private:
-  // A size beyond the address space becomes half of it, which no policy has: the product must not wrap to a size that
-  // can be allocated.
+  // A size beyond the address space becomes half of it, which no policy has. The product must not wrap to an
+  // allocatable size.
   static std::size_t bytes_of(std::size_t n) {
     std::size_t const half = static_cast<std::size_t>(-1) / 2;
     return n > half / sizeof(T) ? half : n * sizeof(T);

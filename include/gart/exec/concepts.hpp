@@ -98,8 +98,8 @@ concept index_kernel = std::is_trivially_copyable_v<K> && !tile_kernel<K> && req
   k(i);
 };
 
-/// Runs `tiles` teams. Each has at most `lanes` lanes on a device (a hint, a multiple of 32; cuda_launch.cuh has the
-/// limits) and one on a host.
+/// Runs `tiles` teams. On a device each has at most `lanes` lanes, a hint and a multiple of 32 (cuda_launch.cuh has the
+/// limits). On a host it has one.
 struct tile_range {
   index_t tiles = 0;   ///< teams
   index_t lanes = 64;  ///< of a team, at most

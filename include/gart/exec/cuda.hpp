@@ -1,15 +1,15 @@
 #pragma once
 /// \file
-/// One CUDA stream of one device. This header is safe without nvcc: memory and queue are compiled into gart::cuda;
-/// kernel launches are templates in cuda_launch.cuh and need nvcc.
+/// One CUDA stream of one device. This header is safe without nvcc: memory and queue are compiled into gart::cuda.
+/// Kernel launches are templates in cuda_launch.cuh and need nvcc.
 ///
 /// Memory comes from the policy's own pool, which keeps freed blocks. After the first steps an allocation is a list
 /// operation on the host and never waits for the device. copy_in goes through a ring of pinned blocks. It does not wait
 /// for the kernels before it, and its source may be reused on return, pageable or pinned.
 ///
-/// Errors: unsupported where no device or driver is found; out_of_memory with the bytes asked and free; gart::error for
-/// any failed launch, with the label of the launch. A later call notices a kernel that fails while it runs, and cannot
-/// know its label. With GART_CUDA_SYNC=1 in the environment every launch is waited for and the label is exact.
+/// Errors: unsupported where no device or driver is found; out_of_memory with the bytes asked and free. gart::error for
+/// any failed launch, with its label. A later call notices a kernel that fails while it runs, and cannot know its
+/// label. With GART_CUDA_SYNC=1 in the environment every launch is waited for and the label is exact.
 
 #include <gart/core/error.hpp>
 #include <gart/core/macros.hpp>
@@ -33,8 +33,8 @@ struct cuda_device_info {
 /// The devices there are; empty without a driver. `reason` then says why.
 std::vector<cuda_device_info> cuda_devices(std::string* reason = nullptr);
 
-/// How two devices of a host reach each other's memory: through the host's, directly, or so that atomic operations work
-/// there too (NVLink).
+/// How two devices of a host reach each other's memory. `host`: through the host's; `direct_atomic`: atomic operations
+/// work there too (NVLink).
 enum class device_link { host, direct, direct_atomic };
 /// Of two devices, by index. Errors: gart::error, with the driver's words, for a device that does not exist.
 device_link link_between(int one, int other);

@@ -33,7 +33,7 @@ class openmp_exec : public host_memory {
 #endif
   }
   /// Calls f while no other thread is in a call for the same `what`. One lock from a striped table. x86 has no atomic
-  /// float add, and a compare-and-swap for each of tens of floats costs more than the rest of a hit.
+  /// float add. A compare-and-swap for each of tens of floats costs more than the rest of a hit.
   template <class F>
   static void exclusively(void const* what, F&& f) {
     auto& lock = row_locks[(reinterpret_cast<std::uintptr_t>(what) >> 4) * 0x9E3779B97F4A7C15ull >> 52];

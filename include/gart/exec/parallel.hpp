@@ -79,8 +79,8 @@ template <tile_kernel K>
 void parallel_for(openmp_exec& exec, char const* label, tile_range range, K const& kernel) {
   if (range.tiles == 0) return;
   stage_scope scope(exec, label);
-  // Neighbouring tiles go to one thread. They write to the same Gaussians, and cache lines shared by cores cost more
-  // than an uneven share of the work.
+  // Neighbouring tiles go to one thread. They write to the same Gaussians. Cache lines shared by cores cost more than
+  // an uneven share of the work.
   [[maybe_unused]] index_t const chunk = std::max<index_t>(1, range.tiles / static_cast<index_t>(16 * exec.threads()));
 #if defined(_OPENMP)
 #pragma omp parallel num_threads(exec.threads())

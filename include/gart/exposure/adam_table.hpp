@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// A table of learned maps of an image's colours, a few numbers a row: the exposure of a view, the vignetting of a
-/// lens. Each maps the rendered image before the loss. The gradient of a row is a sum over the pixels of an image. A
-/// step moves one row by Adam.
+/// A table of learned maps of an image's colours. A row of a few numbers is the exposure of a view, or the vignetting
+/// of a lens. Each maps the rendered image before the loss. The gradient of a row is a sum over the pixels of an image.
+/// A step moves one row by Adam.
 ///
 /// Buffers: 3 Floats + 1 words a row, a few sums, and a copy of the image. Cost: two passes over the image and three
 /// launches over a few numbers a step; no host read. The order of all sums depends on the image's size only. A number

@@ -3,14 +3,14 @@
 /// The exposure of any view, predicted from the learned exposures of the training views. A camera sets its exposure by
 /// the scene before it, and sees about the same from about the same pose. Photographs kept for testing are not used.
 ///
-/// A view's place is six numbers. Three are the camera's position over the median distance of a training view to its
-/// nearest; three are its axis over 0.1. For each of the twelve numbers of the exposure
+/// A view's place is six numbers. Three are the camera's position, over the median distance of a training view to its
+/// nearest. Three are its axis over 0.1. For each of the twelve numbers of the exposure
 ///   minimise over a, b:  sum_i w_i (m_i - a - b . d_i)^2 + 0.02 (sum_i w_i) |b|^2 r^2,   w_i = (|d_i|^2 + 1e-4)^-3,
 /// where d_i leads to training view i and r^2 is the weighted mean of |d_i|^2. The view gets the constant a of this
-/// line through the nearest views. (With b = 0, a weighted mean, a view predicted from the others has a quarter more
-/// error.) Far from all views it tends to their mean. The falloff is that of the lens with the nearest focal lengths
-/// and principal point, over its images' size. Cost: O(views) in double for each call. Without views the exposure is
-/// the identity, without lenses there is no falloff.
+/// line through the nearest views. With b = 0, a weighted mean, a view predicted from the others has a quarter more
+/// error. Far from all views the constant tends to their mean. The falloff is that of the lens with the nearest focal
+/// lengths and principal point, over its images' size. Cost: O(views) in double for each call. Without views the
+/// exposure is the identity, without lenses there is no falloff.
 
 #include <gart/exposure/photo_response.hpp>
 #include <gart/math/glm.hpp>

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// CRC-32C (Castagnoli), the checksum of iSCSI and ext4: reflected polynomial 0x82f63b78, all bits set before and
-/// inverted after (RFC 3720, B.4; "123456789" gives 0xe3069283). Eight bytes at a time by eight tables, about a byte a
-/// clock cycle on any machine. Finds every change of up to 32 neighbouring bits.
+/// CRC-32C (Castagnoli), the checksum of iSCSI and ext4. It has the reflected polynomial 0x82f63b78, all bits set
+/// before and inverted after (RFC 3720, B.4). "123456789" gives 0xe3069283. Eight bytes at a time by eight tables,
+/// about a byte a clock cycle on any machine. Finds every change of up to 32 neighbouring bits.
 
 #include <gart/core/types.hpp>
 

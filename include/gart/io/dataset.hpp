@@ -113,7 +113,7 @@ dataset load_dataset(std::filesystem::path const& path, dataset_options const& o
 /// whole sphere that the factor does not divide.
 camera downscaled(camera const& c, int factor, std::string const& where);
 
-/// The cameras alone, from a dataset (all its views, test views first) or a camera JSON (io/camera_file.hpp);
+/// The cameras alone, from a dataset (all its views, test views first) or a camera JSON (io/camera_file.hpp).
 /// EQUIRECTANGULAR has no fx to cy. Positions are in the coordinates of the capture, from no origin.
 std::vector<named_camera> load_cameras(std::filesystem::path const& path);
 

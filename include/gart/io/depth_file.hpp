@@ -24,8 +24,8 @@ constexpr auto names_of(depth_kind) {
 /// Reads a map in the scene's lengths; 0: not measured. unit: length of a step, or of 1 in a .npy. Its 0 means 0.001
 /// for a PNG, 1 for a .npy. Errors: io_error also for a value that is not finite or negative.
 image_float read_depth(std::filesystem::path const& path, double unit = 0);
-/// Writes a map of one channel as 16-bit PNG: value / unit, rounded, at most 65535; 0 where it is not positive and
-/// finite.
+/// Writes a map of one channel as 16-bit PNG: value / unit, rounded, at most 65535. Values that are not positive and
+/// finite become 0.
 void write_depth_png(std::filesystem::path const& path, image_float const& map, double unit);
 /// An image of any number of channels as .npy, float32, [H][W][channels], or [H][W] for one.
 void write_npy(std::filesystem::path const& path, image_float const& image);

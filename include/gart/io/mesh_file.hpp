@@ -2,7 +2,8 @@
 /// \file
 /// Meshes of triangles in PLY: vertices x y z, faces as lists. Written binary, read in any encoding; faces of more
 /// corners are cut into triangles from their first. Errors: io_error naming the file, the face and the remedy. It is
-/// thrown for a truncated file, a missing property, a corner that is no vertex, a vertex that is not finite.
+/// thrown for a truncated file and a missing property. Also for a corner that is no vertex, and a vertex that is not
+/// finite.
 
 #include <gart/core/types.hpp>
 #include <gart/math/glm.hpp>

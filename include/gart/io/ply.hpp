@@ -10,9 +10,9 @@
 /// A file with that mark or "comment antialiased 1", and without gart's trait, is read as antialiased without a value.
 ///
 /// Errors: io_error naming the file, the property and the remedy. It is thrown for a truncated body, a missing
-/// property, and a count of f_rest that is no degree from 0 to 3. Also for a 2D Gaussian file (no scale_2), and where
-/// no Gaussian can be used (naming the first one's vertex and property). invalid_argument for a model whose arrays
-/// disagree in size.
+/// property, and numbers of f_rest that make no degree from 0 to 3. Also for a 2D Gaussian file (no scale_2), and where
+/// no Gaussian can be used. Then it names the first one's vertex and property. invalid_argument for a model whose
+/// arrays disagree in size.
 
 #include <gart/comm/row_owners.hpp>
 #include <gart/comm/shared_file.hpp>
@@ -24,7 +24,7 @@
 
 namespace gart {
 
-/// Reads a splat file. `traits`, if not null, gets the header's comments that begin with "gart"; `notes` gets what was
+/// Reads a splat file. `traits`, if not null, gets the header's comments that begin with "gart". `notes` gets what was
 /// left out (read_splats in io/splat_file.hpp).
 gaussian_model read_splat_ply(std::filesystem::path const& path, splat_traits* traits = nullptr,
                               std::vector<std::string>* notes = nullptr);

@@ -3,8 +3,8 @@
 /// Files of Gaussians in any format that gart knows: one table has them. A reader knows a file by its first bytes, a
 /// writer by the ending of its name. docs/formats.md describes each format and its cost.
 ///
-/// Every model is in the axes of a splat PLY. Formats with other axes (SPZ: y up, z back; GLB: y up, x left) are turned
-/// as they are read and written, with the colours that depend on direction.
+/// Every model is in the axes of a splat PLY. Other axes are turned as files are read and written (SPZ: y up, z back;
+/// GLB: y up, x left). Colours that depend on direction turn too.
 ///
 /// Errors: io_error naming the file and the supported formats, where it has none of them. io_error naming a property
 /// that changes the image and that the format cannot hold. io_error naming the package to install, where gart was built

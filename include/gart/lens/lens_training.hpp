@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Lenses of a capture, learned with the Gaussians: three numbers for each camera (lens/lens_numbers.hpp), moved by
-/// Adam on the host (optim/host_adam.hpp). Views of the same model, size and lens share a camera.
+/// Lenses of a capture, learned with the Gaussians. Adam moves three numbers of each camera (lens/lens_numbers.hpp) on
+/// the host (optim/host_adam.hpp). Views of the same model, size and lens share a camera.
 ///
 /// A gradient that is not finite moves nothing. Each number stays within half the focal length either way, so the focal
 /// length stays positive. Cost: none that shows beside the gradient's.

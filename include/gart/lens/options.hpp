@@ -4,7 +4,7 @@
 
 namespace gart {
 
-/// Rates are per step of a view through the lens: about how far Adam moves the image, over the focal length.
+/// Rates are per step of a view through the lens. A rate is about how far Adam moves the image, over the focal length.
 struct lens_options {
   float warm_up = 0.02f;     ///< share of the run in which lenses stay as they are, at most 500 steps
   float until = 0.9f;        ///< share of the run after which the rates are constant

@@ -1,11 +1,11 @@
 #pragma once
 /// \file
-/// The loss of an image's depth against a map of distances along the rays. Its gradients are by the depth D (the sum of
-/// w t) and by the transmittance T that the renderer leaves. With A = 1 - T, what a pixel sees is at the mean distance
-/// D / A, and the loss is
+/// The loss of an image's depth against a map of distances along the rays. Its gradients are by the rendered depth D
+/// (the sum of w t) and the rendered transmittance T. With A = 1 - T, what a pixel sees is at the mean distance D / A,
+/// and the loss is
 ///   L = scale / pixels * sum over pixels with a distance z > 0 of  A |D / A - z|,
-/// where A weighs the pixel by how much of it is seen and has no gradient of its own: it could be made small by seeing
-/// less. So with s the sign of D / A - z
+/// where A weighs the pixel by how much of it is seen. A has no gradient of its own: seeing less would lower the loss.
+/// So with s the sign of D / A - z
 ///   dL/dD = scale / pixels * s,   dL/dT = scale / pixels * s D / A,
 /// both bounded, however little is seen. Pixels that the map does not know (0), that a mask excludes, or that see
 /// nothing count nothing. One launch and a sum; 20 bytes a pixel.

@@ -4,7 +4,7 @@
 ///   L = (1 - w) mean|x - y| + w (1 - mean SSIM(x, y)),
 /// means over all pixels and the three channels. The image is not clamped to [0, 1].
 ///
-/// SSIM is written in d = x - y, because near the optimum x and y agree and their difference is what must not cancel:
+/// SSIM is written in d = x - y. Near the optimum x and y agree, and their difference must not cancel:
 ///   SSIM = (1 - m_d^2 / B1) (1 - s_dd / B2),  B1 = m_x^2 + m_y^2 + C1,  B2 = s_xx + s_yy + C2
 /// with m the window's means and s its variances, which is the usual formula, as 2ab = a^2 + b^2 - (a - b)^2. Four
 /// convolutions are then enough (y, d, x^2 + y^2, d^2). They are taken of x - 1/2 and y - 1/2, so that the variances of
@@ -15,7 +15,7 @@
 /// and the gradient at a pixel is the windowed sum of dS/dm_x + 2 (x - 1/2) dS/de + 2 d dS/df.
 ///
 /// Three launches: differences; SSIM with its three partials; their convolution. Memory: 60 bytes a pixel. The gradient
-/// of a strip of the image (differentiate) takes these of the strip and of two windows' reach around it.
+/// of a strip of the image (differentiate) takes these of the strip and of two windows' reach around.
 
 #include <gart/algorithm/reduce.hpp>
 #include <gart/exec/buffer.hpp>
@@ -28,10 +28,10 @@ namespace gart { inline namespace GART_ISA {
 struct truth_view {
   u8 const* pixels = nullptr;  ///< [H][W][channels]
   int channels = 3;            ///< 3, or 4 with straight alpha: rgb * a + background * (1 - a)
-  u8 const* mask = nullptr;    ///< [H][W], or null; where it is 0 the image counts as equal to the truth: no loss,
-                               ///< no gradient, and the means still divide by all pixels; else the gradient's weight,
-                               ///< in parts of 255
-  vec3 background{0.0f};       ///< where alpha is not 1, [0, 1]
+  /// [H][W], or null: the gradient's weight, in parts of 255. Where it is 0 the image counts as equal to the truth,
+  /// without loss or gradient. Means still divide by all pixels.
+  u8 const* mask = nullptr;
+  vec3 background{0.0f};  ///< where alpha is not 1, [0, 1]
 
   /// Whether the pixel is not excluded by the mask.
   GART_HD bool counts(index_t pixel) const { return !mask || mask[pixel] != 0; }
@@ -233,7 +233,8 @@ class image_loss {
     total(loss);
   }
 
-  /// The gradient in some rows of the image, the same bits as of all, and the loss's sums there, in rows of tiles.
+  /// The gradient in some rows of the image, with the bits of the whole image's. Also the loss's sums there, in rows of
+  /// tiles.
   void differentiate(span<float const> image, truth_view truth, int width, int height, float ssim_weight,
                      span<float> gradient, image_rows rows = {}) {
     E& exec = *exec_;
@@ -265,7 +266,7 @@ class image_loss {
   }
   /// The sums of the last differentiate(), [rows of tiles][tiles of a row], of L and of the squared error.
   span<float> sums(int which) { return sums_.view().subspan(which * sums_.size() / 2, sums_.size() / 2); }
-  /// The rows of tiles that begin in some rows of an image: whose sums those have who have the image in parts.
+  /// The rows of tiles that begin in some rows of an image. A rank that has these rows sums those tiles.
   static image_rows sums_of(image_rows rows, int height) {
     return {(rows.first + tiles::height - 1) / tiles::height,
             (std::min(rows.end, height) + tiles::height - 1) / tiles::height};

@@ -29,7 +29,7 @@ struct loss_tiles {
   static constexpr int width = E::device ? 32 : 96, height = E::device ? 16 : 32;
   static constexpr int halo_width = width + 2 * ssim_window::radius, halo_height = height + 2 * ssim_window::radius;
   static constexpr int load_width = (halo_width + load_block - 1) / load_block * load_block;
-  // A warp of a device takes four rows along rows: pitches of one more than a multiple of four share no bank.
+  // A device's warp takes four rows at a time. Pitches of one more than a multiple of four share no bank.
   static constexpr int halo_pitch = E::device ? load_width / 4 * 4 + 5 : load_width, rows_pitch = width + E::device;
   static constexpr int halo_size = halo_pitch * halo_height, rows_size = rows_pitch * halo_height;
   static_assert(halo_pitch >= load_width);
@@ -50,8 +50,8 @@ struct loss_tiles {
             static_cast<int>(tile / row_tiles()) * height};
   }
 
-  // Three functions: the rows of tiles that hold rows of an image, those that their windows reach, and the rows of the
-  // image that windows of rows of tiles reach.
+  // The rows of tiles that hold rows of an image; then those that their windows reach. Last, the rows of the image that
+  // windows of rows of tiles reach.
   static image_rows rows_of(image_rows rows, int image_height) {
     int const end = std::min(rows.end, image_height);
     return rows.first < end ? image_rows{rows.first / height, (end + height - 1) / height} : image_rows{0, 0};
@@ -65,7 +65,7 @@ struct loss_tiles {
             std::min(tiles.end * height + ssim_window::radius, image_height)};
   }
 
-  // f(cell, i, inside) for every cell of the haloed tile; i is its pixel's place in [3][H][W] where it is inside.
+  // Calls f(cell, i, inside) for every cell of the haloed tile. Inside, i is its pixel's place in [3][H][W].
   template <class Team, class F>
   GART_HD void each_halo_cell(Team const& team, place const& at, F const& f) const {
     constexpr int blocks = load_width / load_block;
@@ -143,7 +143,8 @@ struct loss_tiles {
     int const left = E::device ? image.height - y : image.width - x;
     return left < block ? left : block;
   }
-  // f of each of these; all of them, as mostly, without a question each, and always by numbers known to the compiler.
+  // Calls f for each of these. Mostly these are all of them, and then no lane asks; the numbers are always known to the
+  // compiler.
   template <class F>
   static GART_HD GART_INLINE void each_inside(int inside, F const& f) {
     if (inside == block) {

@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// How good a render is, against the truth, in double on the host's cores: PSNR and SSIM as papers report them. Renders
-/// are clamped to [0, 1] first. Straight alpha of a photograph is composited on the background. Pixels that a mask
-/// excludes count in neither sum of PSNR. For SSIM, whose windows need them, they are set to the truth.
-/// Errors: invalid_argument where the sizes differ or an image is empty.
+/// How good a render is, against the truth: PSNR and SSIM as papers report them. In double, on the host's cores.
+/// Renders are clamped to [0, 1] first. Straight alpha of a photograph is composited on the background. Pixels that a
+/// mask excludes count in neither sum of PSNR. For SSIM, whose windows need them, they are set to the truth. Errors:
+/// invalid_argument where the sizes differ or an image is empty.
 
 #include <gart/core/error.hpp>
 #include <gart/loss/ssim_window.hpp>
@@ -87,8 +87,8 @@ inline double psnr(image_float const& render, image_float const& truth) {
                  : std::numeric_limits<double>::infinity();
 }
 
-/// For a render whose excluded pixels equal the truth and a `share` of counted pixels: the mean square over all pixels
-/// is `share` times the mean over those that count.
+/// For a render whose excluded pixels equal the truth; `share` is that of the counted pixels. The mean square over all
+/// pixels is `share` times the mean over the counted ones.
 inline double masked_psnr(image_float const& render, image_float const& truth, double share) {
   return psnr(render, truth) + 10 * std::log10(share);
 }

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The window and constants of SSIM (Wang et al., Image Quality Assessment: From Error Visibility to Structural
-/// Similarity, 2004), the same as in the systems that gart is compared with. The window is an 11 x 11 Gaussian of
+/// The window and constants of SSIM, the same as in the systems that gart is compared with. Source: Wang et al., Image
+/// Quality Assessment: From Error Visibility to Structural Similarity, 2004. The window is an 11 x 11 Gaussian of
 /// deviation 1.5, separable, with zeros outside the image. For images in [0, 1], C1 = 0.01^2 and C2 = 0.03^2.
 
 #include <gart/core/macros.hpp>

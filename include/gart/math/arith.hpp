@@ -3,7 +3,7 @@
 /// Float arithmetic whose rounding is fixed by the source, not by the compiler's choice to contract a*b+c. Code that
 /// decides a hit, an order or an address uses these. So forward and backward, every traverser and (on hosts with FMA)
 /// every policy compute the same bits. Host code that uses gart is built with -ffp-contract=off, which the CMake target
-/// carries; on a device the intrinsics are never contracted.
+/// carries. On a device the intrinsics are never contracted.
 
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
 #error "gart decides hits by IEEE arithmetic: compile what includes it without -ffast-math and -ffinite-math-only"
@@ -124,8 +124,8 @@ GART_HD GART_INLINE void reciprocals(float (&a)[N]) {
 /// By the exponent bits, so that no fast-math switch can remove it.
 GART_HD GART_INLINE bool is_finite(float f) { return (float_to_bits(f) & 0x7f800000u) != 0x7f800000u; }
 
-/// For formulas over floats and over lanes of them (math/lanes.hpp): the types of a number's comparisons and counts,
-/// and their operations.
+/// For formulas over floats and over lanes of them (math/lanes.hpp). It has the types of a number's comparisons and
+/// counts, and their operations.
 template <class F>
 struct number;
 /// One float.

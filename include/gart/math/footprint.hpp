@@ -1,18 +1,18 @@
 #pragma once
 /// \file
-/// Where on the image a Gaussian can be hit: its ellipsoid |p|^2 <= cutoff, which a camera bounds (camera/model.hpp),
-/// and its perspective-correct bounds for a pinhole.
+/// Where on the image a Gaussian can be hit. A camera bounds its ellipsoid |p|^2 <= cutoff (camera/model.hpp). For a
+/// pinhole the bounds are perspective-correct.
 ///
-/// In camera space the ellipsoid is m + A s, |s| <= 1, A = c W R S with c^2 the cutoff and rows A_x, A_y, A_z. Planes x
-/// = u z through the camera touch it where (m_x - u m_z)^2 = |A_x - u A_z|^2, a quadratic in u. The roots are the
-/// bounds of x / z when the ellipsoid lies in front of the camera (the paper's centre p and half-extent h in another
-/// form). When it crosses the near plane z = n only the part in front counts. A root is a bound if it touches at z >=
-/// n; the section with the near plane, an ellipse, gives the others. So a Gaussian beside or around the camera gets the
-/// box of its visible part, never more than the section demands.
+/// In camera space the ellipsoid is m + A s, |s| <= 1. A = c W R S, with c^2 the cutoff and rows A_x, A_y, A_z. Planes
+/// x = u z through the camera touch it where (m_x - u m_z)^2 = |A_x - u A_z|^2, a quadratic in u. When the ellipsoid
+/// lies in front of the camera, the roots bound x / z. They are the paper's centre p and half-extent h in another form.
+/// When it crosses the near plane z = n only the part in front counts. A root is a bound if it touches at z >= n. The
+/// ellipse that the near plane cuts out gives the others. So a Gaussian beside or around the camera gets the box of its
+/// visible part, and no more.
 ///
-/// All in double: the quadratic of a small far ellipsoid cancels to a few digits in float. The box is then widened by
-/// what float arithmetic can move a hit (32 roundings of the distance) and a hundredth of a pixel. No pixel that hits
-/// lies outside.
+/// All in double: the quadratic of a small far ellipsoid cancels to a few digits in float. The box is then widened by a
+/// hundredth of a pixel, and by a hit's movement in float arithmetic. The latter is 32 roundings of the distance. No
+/// pixel that hits lies outside.
 
 #include <gart/math/ray_gaussian.hpp>
 
@@ -37,8 +37,9 @@ struct pixel_box {
 struct footprint {
   pixel_box box;    ///< empty where it cannot be
   float depth = 0;  ///< no hit has a smaller one, along what its camera measures depth: conservative near depth
-  /// For an image whose right border goes on at its left one: its width where the box goes on past it, and the box's
-  /// columns from there on are the image's from 0 on. Else 0. Such a box leaves out seam_room columns or more.
+  /// For an image whose right border goes on at its left one. Where the box passes that border it is the image's width.
+  /// The box's columns from there on are the image's from 0 on. Else 0. Such a box leaves out seam_room columns or
+  /// more.
   u16 seam = 0;
 
   static constexpr int seam_room = 32;  ///< as wide as the widest tile: no tile holds both ends of a box
@@ -74,7 +75,8 @@ GART_HD inline footprint footprint_of(Bounds const& bounds, gaussian_parameters 
   return ellipsoid_of<Response>(g, frame, alpha_min, e) ? bounds(e) : footprint{};
 }
 
-/// No hit at t > near is nearer to the camera's centre: the ellipsoid lies beyond the plane across its own direction.
+/// No hit at t > near is nearer to the camera's centre. For the ellipsoid lies beyond the plane across its own
+/// direction.
 GART_HD inline float least_distance(ellipsoid const& e, float near) {
   vec3d const& m = e.center;
   double const distance = sqrt(m.x * m.x + m.y * m.y + m.z * m.z);

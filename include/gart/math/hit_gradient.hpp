@@ -2,23 +2,23 @@
 /// \file
 /// Gradients of one hit and of one Gaussian: the only gradient code of the renderer.
 ///
-/// With w = T alpha, a hit of colour c adds w c to its ray and leaves T (1 - alpha). With L the colour before the hit
-/// and V = L + T c the colour the pixel would have if the hit were opaque, C the colour it has, and g the image
-/// gradient,
+/// With w = T alpha, a hit of colour c adds w c to its ray and leaves T (1 - alpha). Let L be the colour before the
+/// hit, C the pixel's colour and g the image gradient. V = L + T c is the colour that the pixel would have if the hit
+/// were opaque. Then
 ///   C = alpha V + (1 - alpha) (the colour without the hit),   dL/dalpha = (V - C).g / (1 - alpha),   dL/dc = w g.
-/// alpha = sigma rho(|p|^2), so with a = alpha dL/dalpha and b = a times the slope of ln rho (math/response.hpp; b = a
-/// for a Gaussian) the geometry needs only ten sums over the hits, the moments, all in the Gaussian's own space:
+/// alpha = sigma rho(|p|^2). Let a = alpha dL/dalpha, and b = a times the slope of ln rho (math/response.hpp; b = a for
+/// a Gaussian). Then the geometry needs only ten sums over the hits, the moments, all in the Gaussian's own space:
 ///   m0 = sum a,  m1 = sum b p,  m2 = sum b p p^T
 ///   dL/d logit = sigmoid(-logit) m0      dL/d mean = M^T m1           dL/d log s_k = m2_kk
 ///   dL/d rotation (body frame)_i = m2_jk (s_j / s_k - s_k / s_j), (i, j, k) cyclic
 /// for x = mean + R S p is the point of largest response and dL/dM = -(sum b p p^T)(R S)^T. Where a clamp is active
 /// (alpha at alpha_max, a colour at 0) the derivative through it is zero.
 ///
-/// The depth sum w t is composited as a channel of colour t, and t has a gradient of its own: at the point of largest
-/// response d_g.p = 0, so with e = w dL/d depth / |d_g|^2 the same sums take it in,
+/// The depth sum w t is composited as a channel of colour t. But t has a gradient of its own. At the point of largest
+/// response d_g.p = 0. So with e = w dL/d depth / |d_g|^2 the same sums take it in:
 ///   m1 += e d_g,  m2 += e (p d_g^T + d_g p^T).
 ///
-/// A ray o + t d passes the point at t, so that what moves the Gaussian by dx moves the ray by -dx: of a hit
+/// A ray o + t d passes the point at t. So what moves the Gaussian by dx moves the ray by -dx. A hit gives
 ///   dL/do = -M^T m1,   dL/dd = -M^T (t m1 + e p),
 /// the last term by how t itself changes, dt = -(p + t d_g).M dd / |d_g|^2. Neither
 /// includes how colour changes with d, nor what changes the length of d.
@@ -29,9 +29,9 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// The ten sums, as floats in memory: m0, m1 xyz, m2 xx yy zz yz xz xy. Then the error seen through the Gaussian, the
-/// sum over its hits of w times the pixel's error, by which densification finds where more are needed. Then one of
-/// padding (16-byte words).
+/// The ten sums, as floats in memory: m0, m1 xyz, m2 xx yy zz yz xz xy. Then the error seen through the Gaussian: the
+/// sum over its hits of w times the pixel's error. By it densification finds where more are needed. Then one of padding
+/// (16-byte words).
 inline constexpr int moment_count = 11;
 inline constexpr int error_place = 10;    ///< the place of the error
 inline constexpr int moment_stride = 12;  ///< floats a Gaussian

@@ -1,11 +1,11 @@
 #pragma once
 /// \file
 /// Several floats at a time, one a lane, for the host policies. The formulas of math/ are templates over the number,
-/// and give a lane the bits of a float. As many lanes as the widest registers of the instruction set that is compiled
-/// for hold: 16, 8 or 4 (core/isa.hpp has the one with 16).
+/// and give a lane the bits of a float. There are as many lanes as the compiled instruction set's widest registers
+/// hold: 16, 8 or 4 (core/isa.hpp has the one with 16).
 ///
-/// A comparison gives a lane_mask: one bit a lane where the machine has such registers, else all bits of a lane set or
-/// none. select takes the place of ?:. The vectors are the compiler's (GCC, Clang). Intrinsics serve only where the
+/// A comparison gives a lane_mask. It has one bit a lane where the machine has such registers, else all bits of a lane
+/// or none. select takes the place of ?:. The vectors are the compiler's (GCC, Clang). Intrinsics serve only where the
 /// language has no word: masks, fused multiply-add, and the transposition of four numbers a lane.
 
 #include <gart/math/arith.hpp>
@@ -231,8 +231,8 @@ GART_INLINE void write_interleaved(float* out, int n, lanes a, lanes b, lanes c)
 #endif
 }
 
-/// Four numbers a lane, where they lie together in memory: lanes 4 r to 4 r + 3 one after another from
-/// `first` + r `stride` (in floats). Lanes that are not in the mask are not touched, and read as zeros.
+/// Four numbers a lane, where they lie together in memory. Lanes 4 r to 4 r + 3 follow one another from `first` + r
+/// `stride` (in floats). Lanes that are not in the mask are not touched, and read as zeros.
 #if defined(GART_LANES_AVX512)
 namespace detail {
 // Each of the 4 lanes of a row, four times: a bit a float.

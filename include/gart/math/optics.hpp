@@ -12,7 +12,7 @@ namespace gart { inline namespace GART_ISA {
 /// Of length 1.
 GART_HD GART_INLINE vec3 unit(vec3 const& v) { return v * reciprocal(square_root(glm::dot(v, v))); }
 
-/// Fresnel's reflection of a dielectric, unpolarised: the cosine on the side it comes from, and the ratio of indices
+/// Fresnel's reflection of a dielectric, unpolarised. `cosine` is that on the light's side, `ratio` that of the indices
 /// from there to the other side. 1 where all is reflected.
 GART_HD GART_INLINE float fresnel(float cosine, float ratio) {
   float const sine2 = ratio * ratio * fmaxf(0.0f, 1.0f - cosine * cosine);

@@ -34,8 +34,8 @@ GART_HD GART_INLINE mat3 to_matrix(quaternion const& q) {
   return r;
 }
 
-/// Gradient with respect to the raw quaternion of a function whose gradient with respect to a small rotation w in the
-/// body's frame (R exp([w]x)) is `body`: 2 q (0, body) / |q|, with q normalised. It has no part along q.
+/// The gradient by the raw quaternion, 2 q (0, body) / |q| with q normalised. `body` is the gradient by a small
+/// rotation w in the body's frame (R exp([w]x)). It has no part along q.
 GART_HD GART_INLINE quaternion pull_back(quaternion const& q, vec3 body) {
   float const s = 2.0f / norm2(q);  // one 1/|q| to normalise q, one through the normalisation
   return {s * (-q.x * body.x - q.y * body.y - q.z * body.z), s * (q.w * body.x + q.y * body.z - q.z * body.y),

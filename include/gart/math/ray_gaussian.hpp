@@ -3,14 +3,15 @@
 /// A Gaussian as a ray meets it. In the Gaussian's own space (unit sphere, axes of the ellipsoid) a ray o + t d is
 ///   o_g = M (o - mu),  d_g = M d,  M = S^-1 R^T;
 /// the response is largest at t = -o_g.d_g / d_g.d_g, where p = o_g + t d_g is the offset from the centre. There it is
-/// rho(|p|^2), for a Gaussian exp(-|p|^2 / 2) (math/response.hpp). The ray hits where sigma * rho >= alpha_min, that is
-/// where |p|^2 is at most the cutoff, 2 ln(sigma / alpha_min) for a Gaussian, and t > near.
+/// rho(|p|^2), for a Gaussian exp(-|p|^2 / 2) (math/response.hpp). The ray hits where sigma * rho >= alpha_min and t >
+/// near. The former holds where |p|^2 is at most the cutoff, 2 ln(sigma / alpha_min) for a Gaussian.
 ///
-/// The offset is not computed from t. A rounding of t moves the point along the ray by 6e-8 of |o_g|, the distance over
-/// the thinnest axis, which may be 1e8 and more. With c = o_g x d_g, which is the same from any point of the ray,
+/// The offset is not computed from t. A rounding of t moves the point along the ray by 6e-8 of |o_g|. This is the
+/// distance over the thinnest axis, which may be 1e8 and more. With c = o_g x d_g, which is the same from any point of
+/// the ray,
 ///   |p|^2 = |c|^2 / |d_g|^2,   p = d_g x c / |d_g|^2,
-/// and each product of c is off by a rounding of the distance over the axes that it is of: in the world the point stays
-/// within a few roundings of the distance, however thin the Gaussian, as the ray itself does.
+/// and each product of c is off by a rounding of the distance over the axes that it is of. So in the world the point
+/// stays within a few roundings of the distance, however thin the Gaussian. The ray itself does no better.
 ///
 /// Everything is relative to a frame, a point of the world held in double (the camera's centre for primary rays). mu is
 /// subtracted from it in double, so scenes far from the origin lose nothing. This file alone decides which candidates
@@ -214,8 +215,8 @@ GART_HD GART_INLINE void evaluate_all(ray_peak (&out)[N], F&& of) {
   for (int i = 0; i < N; ++i) out[i] = ray_peak_of_approach(a[i], inverse[i]);
 }
 
-/// p, in standard deviations along the Gaussian's axes. Along the thin axis of a pancake it is all but zero, and M
-/// magnifies it in the gradients of mean and rotation. The product has its digits; o_g + t d_g has none.
+/// p, in standard deviations along the Gaussian's axes. Along the thin axis of a pancake it is all but zero. In the
+/// gradients of mean and rotation M magnifies it. The product has its digits; o_g + t d_g has none.
 template <class F>
 GART_HD GART_INLINE vec3_of<F> offset_of(ray_peak_of<F> const& r) {
   return cross_product(r.d, r.c);

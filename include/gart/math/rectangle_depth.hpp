@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// How near rays from one point can hit a Gaussian where they pass through a parallelogram of a plane. For all points d
-/// = u x + v y + z, u and v of a rectangle: a lower bound of the factor by which the ray reaches the hit from d. For
-/// the axes x, y, z of a camera u and v are slopes, and the factor is the hit's depth in camera space.
+/// How near rays from one point can hit a Gaussian where they pass through a parallelogram of a plane. All points d = u
+/// x + v y + z, u and v of a rectangle, have a factor by which their ray reaches the hit. This is a lower bound of it.
+/// For the axes x, y, z of a camera, u and v are slopes. The factor is then the hit's depth in camera space.
 ///
 /// With rows m_k of M the factor at the largest response is
 ///   N / Q,  N = -sum_k o_k (m_k . d),  Q = sum_k (m_k . d)^2.
@@ -11,8 +11,8 @@
 /// is taken off N and added to |m_k . d| in a way that leaves the one linear and the other convex: the bound holds for
 /// every ray.
 ///
-/// Where the rays' origins are o + s h, -1 <= s <= 1, the bound is (N - k sqrt(Q)) / Q, k = |M h|, with N of rays from
-/// o. Since sqrt(Q) is convex too, the least value still lies at a corner.
+/// Let the rays' origins be o + s h, -1 <= s <= 1. Then the bound is (N - k sqrt(Q)) / Q, k = |M h|, with N of rays
+/// from o. Since sqrt(Q) is convex too, the least value still lies at a corner.
 
 #include <gart/math/ray_gaussian.hpp>
 
@@ -35,7 +35,7 @@ class rectangle_depth {
     }
   }
 
-  /// At most the factor of any hit through [u0, u1] x [v0, v1]; not positive, or NaN, where it says nothing.
+  /// At most the factor of any hit through [u0, u1] x [v0, v1]. It says nothing where it is not positive, or NaN.
   GART_HD GART_INLINE float operator()(float u0, float u1, float v0, float v1) const {
     float const a = at(u0, v0), b = at(u1, v0), c = at(u0, v1), d = at(u1, v1);
     float const ab = b < a ? b : a, cd = d < c ? d : c;
@@ -89,7 +89,7 @@ class moving_rectangle_depth : rectangle_depth {
     static_cast<rectangle_depth&>(*this) = rectangle_depth(g, plane, reach);
   }
 
-  /// At most the factor of any hit through [u0, u1] x [v0, v1]; not positive, or NaN, where it says nothing.
+  /// At most the factor of any hit through [u0, u1] x [v0, v1]. It says nothing where it is not positive, or NaN.
   GART_HD float operator()(float u0, float u1, float v0, float v1) const {
     float least = at(u0, v0);
     for (int corner = 1; corner < 4; ++corner) {

@@ -4,7 +4,7 @@
 /// 2024),
 ///   rho = exp(s |p|^n),  s = -4.5 / 3^n,  n in {1, 2, 3, 4, 5, 8},
 /// equal at the centre and at three standard deviations. n = 2 is the Gaussian. A larger n is flatter inside and
-/// steeper at the rim, so fewer Gaussians cover a surface and rays meet fewer of them. n = 1 has a cusp at its centre.
+/// steeper at the rim. So fewer Gaussians cover a surface, and rays meet fewer of them. n = 1 has a cusp at its centre.
 /// Everything else that asks for a Response takes one of these types. A response offers, all of the squared distance
 /// |p|^2:
 ///   response(d2)   rho
@@ -16,8 +16,7 @@
 /// multiplication and square roots, the same bits on every policy. cutoff is within 4e-7 of exact, relatively.
 ///
 /// The cusp of n = 1: towards the centre the gradient's norm goes to a limit, its direction does not. At |p| = 0, where
-/// no direction is given, slope is 0 and with it the gradient of mean, scale and rotation: the mean over all
-/// directions.
+/// no direction is given, slope is 0. So is the gradient of mean, scale and rotation: the mean over all directions.
 
 #include <gart/math/arith.hpp>
 #include <gart/math/lanes.hpp>

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Real spherical harmonics to degree 3 with the signs and order of the 3DGS files: colour is max(0, 0.5 + sum_k c_k
-/// Y_k(d)), d the unit direction of the ray. A sum that is no finite number is black, like a negative one: one broken
+/// Real spherical harmonics to degree 3 with the signs and order of the 3DGS files. Colour is max(0, 0.5 + sum_k c_k
+/// Y_k(d)), d the unit direction of the ray. A sum that is no finite number is black, like a negative one. One broken
 /// Gaussian must not spoil every ray that meets it.
 
 #include <gart/core/macros.hpp>
@@ -23,7 +23,7 @@ struct sh_basis {
 
   sh_basis() = default;
   /// At a unit direction. The arithmetic is fixed (math/arith.hpp). A compiler that contracts products and sums does so
-  /// differently in each kernel, and colours of tracers would differ in the last bits.
+  /// differently in each kernel. Colours of tracers would differ in the last bits.
   GART_HD GART_INLINE explicit sh_basis(vec3_of<F> const& d) {
     y[0] = static_cast<float>(sh_constant);
     if constexpr (Degree >= 1) {

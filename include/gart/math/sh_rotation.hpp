@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Spherical harmonics turned: the function of coefficients c' has in direction R d the value that the function of c
-/// has in d, for any rotation R. A matrix of 2 l + 1 rows maps a band of degree l to itself. An entry is the integral
+/// Spherical harmonics turned by any rotation R. The function of coefficients c' has in direction R d the value that
+/// the function of c has in d. A matrix of 2 l + 1 rows maps a band of degree l to itself. An entry is the integral
 /// over the sphere of Y_j(d) Y_k(R^-1 d). A quadrature that is exact for polynomials of degree 7 takes it, from the
 /// basis of math/sh.hpp, to its roundings. Making one takes a few thousand operations, applying it 249 at degree 3.
 

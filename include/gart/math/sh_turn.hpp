@@ -5,8 +5,7 @@
 /// G^a the generators of rotations in the basis of math/sh.hpp: antisymmetric, a band for itself, few entries a row. So
 /// the derivative of a function of colours by w needs what its gradient by the coefficients holds already:
 ///   dL/dw_a = sum_kl c_k G^a_kl dL/dc_l,   since dL/dc_l is a sum of Y_l over the hits.
-/// Of one hit, whose dL/dc_l is Y_l times the gradient of its colour, one channel will do: c_k summed with that
-/// gradient.
+/// For one hit dL/dc_l is Y_l times the gradient of its colour. So one channel will do: c_k summed with that gradient.
 
 #include <gart/core/macros.hpp>
 #include <gart/math/glm.hpp>

@@ -1,15 +1,15 @@
 #pragma once
 /// \file
-/// The silhouette of a Gaussian seen from a point, on a plane of rays, and whether a rectangle of it can be hit. A box
-/// about the silhouette holds it; of a long one that lies across the box most of the box is empty.
+/// The silhouette of a Gaussian seen from a point, on a plane of rays. It tells whether a rectangle of the plane can be
+/// hit. A box about the silhouette holds it. Where a long silhouette lies across the box, most of the box is empty.
 ///
-/// Directions are x dx + y dy + z of the plane's columns. With the ellipsoid m + A s, |s| <= 1, in these axes and in
-/// slopes relative to its centre's, b_i = A_i - (m_i / m_z) A_z for i = x, y, the silhouette is the ellipse
+/// Directions are x dx + y dy + z of the plane's columns. Let the ellipsoid be m + A s, |s| <= 1, in these axes. Let
+/// slopes be relative to its centre's, b_i = A_i - (m_i / m_z) A_z for i = x, y. Then the silhouette is the ellipse
 ///   {c + L s, |s| <= 1},  S = L L^T = (b_i . b_j) / W + e_i e_j,  W = m_z^2 - |A_z|^2,
 ///   c = m / m_z + e,      e_i = -(b_i . A_z) / W:
 /// sums of what does not cancel. It holds Cholesky's L, L^-1 q = (q_x / l_xx, (q_y - (S_xy / S_xx) q_x) / l_yy). As for
-/// a box (math/footprint.hpp), the movement of a hit by float arithmetic is added: an ellipse of (1 + k) S + (1 + 1 /
-/// k) pad^2 holds one of S widened by pad. It is computed in double; questions about rectangles are in float. Where
+/// a box (math/footprint.hpp), it is widened by how far float arithmetic can move a hit. An ellipse of (1 + k) S + (1 +
+/// 1 / k) pad^2 holds one of S widened by pad. It is computed in double; questions about rectangles are in float. Where
 /// some of the ellipsoid is not in front of the point every rectangle meets it.
 
 #include <gart/math/footprint.hpp>

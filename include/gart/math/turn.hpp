@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Turns as a vector, the axis times the angle in radians, and as a matrix: the exponential map of rotations, there and
-/// back. In double.
+/// Turns as a vector, the axis times the angle in radians, and as a matrix. The exponential map of rotations leads
+/// there and back. In double.
 
 #include <gart/core/isa.hpp>
 #include <gart/core/macros.hpp>

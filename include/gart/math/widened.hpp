@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// A Gaussian as a filter of standard deviation r sees it from the frame's origin. Every axis is widened by r, and the
-/// response is lowered so that its integral across the line of sight stays the same.
+/// A Gaussian as a filter of standard deviation r sees it from the frame's origin. Every axis is widened by r. The
+/// response is lowered, so that its integral across the line of sight stays the same.
 ///   S'^2 = S^2 + r^2,   sigma' = sigma sqrt(F),   F = prod S^2 d^T C^-1 d / (prod S'^2 d^T C'^-1 d),
 /// C = R S^2 R^T the covariance in world axes, d the direction of the mean. For the largest response along rays of
 /// direction d is a Gaussian of the plane across d. Its covariance is the projection of C onto that plane, whose
@@ -81,8 +81,8 @@ GART_HD GART_INLINE gaussian_parameters widened(gaussian_parameters const& g, ve
   return out;
 }
 
-/// The largest share of its opacity that a Gaussian keeps under a filter, over all directions: along its shortest axis,
-/// where the other two are widened. F is a mean of such products, weighted by the direction.
+/// The largest share of its opacity that a Gaussian keeps under a filter, over all directions. It keeps it along its
+/// shortest axis, where the other two are widened. F is a mean of such products, weighted by the direction.
 GART_HD GART_INLINE float largest_share_left(vec3 const& log_scale, float r) {
   float left[3];
   for (int k = 0; k < 3; ++k) {
@@ -93,8 +93,8 @@ GART_HD GART_INLINE float largest_share_left(vec3 const& log_scale, float r) {
   return square_root(first * (less > left[2] ? less : left[2]));
 }
 
-/// From the gradient of the widened parameters to that of the stored ones; by_log_sigma is dL/d ln sigma', the moment
-/// m0. Each may depend on the mean by the direction and by r, on the scales and on the rotation by F:
+/// From the gradient of the widened parameters to that of the stored ones. by_log_sigma is dL/d ln sigma', the moment
+/// m0. Each may depend on the mean by the direction and by r, and on scales and rotation by F:
 ///   d ln s'_k / d ln s_k = a_k / (1 + a_k), the rest of 1 is d ln s'_k / d ln r;
 ///   1/2 d ln F / d ln s_k = a_k (N_k / N - N'_k / N') = h_k, N_k = dN / da_k;   1/2 d ln F / d ln r = -sum h_k;
 ///   1/2 d ln F / d u_k = u_k (a_i a_j / N - (1 + a_i)(1 + a_j) / N') = u_k e_k.

@@ -6,9 +6,9 @@
 /// An element whose gradient (or update) is not finite keeps its value and moments, and is counted. Bound by memory:
 /// 28 bytes moved an element.
 ///
-/// With options.sparse a Gaussian whose mean has no gradient (no ray of the step met it) keeps its parameters and
-/// moments. Of each of its five groups 12 bytes are read, and none written. Its moments wait until it is seen again
-/// instead of fading, and so do penalties on it.
+/// With options.sparse a Gaussian that no ray of the step met (its mean has no gradient) keeps parameters and moments.
+/// Of each of its five groups 12 bytes are read, and none written. Its moments wait until it is seen again instead of
+/// fading, and so do penalties on it.
 ///
 /// options.sh_pull is the derivative of a penalty on the square of the bands of colour above the first. Fast rates make
 /// them follow the noise of single views, which the pull removes (L2 regularization). It joins the gradient here, where
@@ -54,7 +54,7 @@ struct adam_rule {
 
   /// @{ Of a step, counted from 1; of steps of a batch of images `step` counts images. A batch equals as many steps of
   /// one image, where these are small: betas^batch, epsilon / sqrt(batch), and rates times sqrt(batch), which the
-  /// caller applies (Malladi et al., On the SDEs and Scaling Rules for Adaptive Gradient Algorithms, 2022).
+  /// caller applies. Source: Malladi et al., On the SDEs and Scaling Rules for Adaptive Gradient Algorithms, 2022.
   adam_rule() = default;
   adam_rule(adam_options const& o, int step, int batch = 1)
       : beta1(batch == 1 ? o.beta1 : std::pow(o.beta1, static_cast<float>(batch))),
@@ -126,7 +126,7 @@ struct adam_kernel : adam_arguments {
 #if !defined(__CUDACC__)
     if constexpr (!E::device) return update_rows(group, row, count);
 #endif
-    // Four elements a lane: by single ones a step is bound by the loads in flight, not by the memory's bandwidth.
+    // Four elements a lane. By single ones the loads in flight would bound a step, not the memory's bandwidth.
     std::size_t const base = std::size_t{row} * group.stride;
     index_t const elements = count * group.stride, quads = elements / 4;
     team.for_each(quads, [&](index_t q) {
@@ -169,7 +169,7 @@ struct adam_kernel : adam_arguments {
       group.parameter[i] = e.parameter, group.first[i] = e.first, group.second[i] = e.second;
   }
 
-  // Elements e to e + 3 of a tile, which begins at `base` with a row, by gradient(), which is called where any moves.
+  // Elements e to e + 3 of a tile, which begins at `base` with a row. gradient() is called where any of them moves.
   // Elements that must not move keep their values.
   GART_KERNEL void update_quad(adam_group const& group, std::size_t base, index_t row, index_t e,
                                auto const& gradient) const {
@@ -303,7 +303,7 @@ class adam_pass {
   /// All but the colours, whose gradient need not be there yet.
   void geometry(E& exec) const { launch(exec, with_.group_of(sh_array) + 1); }
   /// The colours, by gradients that lie in no memory. Calls launch(take), whose kernel calls take(row, first, piece)
-  /// for all floats of each Gaussian's colours: a quad of them, or one in piece.v, from number `first` on.
+  /// for all floats of each Gaussian's colours. A piece has a quad of them, or one in piece.v, from number `first` on.
   template <class Launch>
   void colors(Launch&& launch) const {
     with_kernel([&]<class Kernel>(Kernel const& k) { launch(detail::adam_colors<Kernel>{k}); });

@@ -6,8 +6,8 @@
 /// A Gaussian that explains one photograph alone is then of little use, so this reduces overfitting. From a share
 /// `until` of the run on, steps show the whole scene, which is what will be rendered.
 ///
-/// An o' over 0.995 is that, or o where that is more. The gradient by the logit of o' is used as that by the logit of
-/// o; Gaussians left out have none. Draws depend on the Gaussians' numbers in the scene, so several ranks draw as one
+/// An o' over 0.995 is that, or o where that is more. The gradient by the logit of o' serves as that by the logit of o.
+/// Gaussians left out have none. Draws depend on the Gaussians' numbers in the scene, so several ranks draw as one
 /// does. Cost: 4 bytes a Gaussian, and a pass that reads and writes as much; nothing without a share.
 
 #include <gart/comm/row_owners.hpp>

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Rows of a few learned numbers that Adam moves on the host, in double: the pose of a view, the lens of a camera. A
-/// step moves one row. Adam counts the visits of a row, since a run has few of them.
+/// Rows of a few learned numbers that Adam moves on the host, in double. A row is the pose of a view, or the lens of a
+/// camera. A step moves one row. Adam counts the visits of a row, since a run has few of them.
 
 #include <gart/core/named_arrays.hpp>
 #include <gart/optim/schedule.hpp>

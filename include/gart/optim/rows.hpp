@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// A Gaussian as one row of floats across the parameter arrays, in the order of their table
-/// (scene/parameter_table.hpp): columns 0-2 mean, 3-5 log_scale, 6-9 quaternion, 10 opacity, 11.. sh. One launch over
+/// (scene/parameter_table.hpp). Columns: 0-2 mean, 3-5 log_scale, 6-9 quaternion, 10 opacity, 11.. sh. One launch over
 /// (row, column), coalesced on a device, moves, copies or clears whole Gaussians.
 
 #include <gart/comm/row_owners.hpp>

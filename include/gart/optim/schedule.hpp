@@ -37,7 +37,8 @@ inline learning_rates rates_at(learning_rates rates, float extent, int step, int
 /// Whether a step that ends at `step` images, and has `batch` of them, is one that comes every so many.
 inline bool is_multiple(int step, int every, int batch) { return every > 0 && step / every != (step - batch) / every; }
 
-/// Adds a degree every `every` steps, and earlier in short runs: every run reaches the full degree in its first tenth.
+/// Adds a degree every `every` steps, and earlier in short runs. So every run reaches the full degree in its first
+/// tenth.
 inline int sh_interval(int degree, int every, int steps) { return std::max(1, std::min(every, steps / (10 * degree))); }
 /// The degree in use at a step.
 inline int sh_degree_at(int step, int degree, int every, int steps) {

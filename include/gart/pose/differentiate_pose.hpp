@@ -7,18 +7,18 @@
 ///   pose_gradient const g = by_pose(frame, gradients);          // or into memory of the policy
 ///
 /// An image depends on the Gaussians relative to the camera. Moving the camera by dp moves all of them by -dp. Turning
-/// it by a small w about its position p turns them by -w about p, with the colours that the turned rays see:
+/// it by a small w about its position p turns them by -w about p. They keep the colours that the turned rays see:
 ///   dL/dp = -sum_i dL/dmean_i
 ///   dL/dw = sum_i [ -(mean_i - p) x dL/dmean_i - torque_i + turn_i ]
-/// torque_i is the gradient by a small turn of the Gaussian in the world, half the vector part of dL/dq q*
+/// torque_i is the gradient by a small turn of the Gaussian in the world. It is half the vector part of dL/dq q*
 /// (math/quaternion.hpp). turn_i is that of its colours (math/sh_turn.hpp). No ray is traced again. It holds for every
-/// method and any function of the image, with or without the filter of the pixels, and for any camera whose rays all
+/// method, any function of the image, and with or without the pixels' filter. It holds for any camera whose rays all
 /// move with its pose.
 ///
 /// Gaussians whose mean and first band have no gradient were not seen, and only cost their reads. Numbers that are not
 /// finite are skipped. Sums over lanes are in double, in an order that depends on the number of Gaussians only. Several
 /// ranks each sum their own runs (of_rows); on hosts the total has the bits of a single rank. Cost: one read of the
-/// gradients, and of the parameters of Gaussians that were seen: at most 464 bytes a Gaussian of degree 3. Memory: 48
+/// gradients, and of the parameters of seen Gaussians. That is at most 464 bytes a Gaussian of degree 3. Memory: 48
 /// bytes for each of at most 1024 sums; on hosts one for 64 Gaussians.
 
 #include <gart/core/error.hpp>

@@ -45,8 +45,8 @@ inline camera moved(camera view, pose_numbers const& by, double unit) {
   return view;
 }
 
-/// The gradient by the argument of `moved`, from that by the resulting pose. Turns do not commute: dL/dw is J^T times
-/// the gradient in the camera's axes, J the left Jacobian of the exponential map.
+/// The gradient by the argument of `moved`, from that by the resulting pose. Turns do not commute. So dL/dw is J^T
+/// times the gradient in the camera's axes, J the left Jacobian of the exponential map.
 inline pose_numbers pull_back(camera const& from, pose_numbers const& at, double unit, pose_gradient const& by) {
   mat3d const back = glm::transpose(axes_of(from));
   vec3d const t = back * by.translation * unit, g = back * by.rotation, w(at[3], at[4], at[5]);

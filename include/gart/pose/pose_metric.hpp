@@ -4,7 +4,7 @@
 /// in direction d, with q one over its distance, then moves on the sphere of directions by
 ///   -unit q (1 - d d^T) t + d x w;
 /// The metric is the 6 x 6 matrix of the mean square of this movement over the image. A shift to the side and a turn
-/// after it nearly cancel. In numbers where the metric is the identity they do not, so Adam, which treats numbers one
+/// after it nearly cancel. In numbers where the metric is the identity they do not. So Adam, which treats numbers one
 /// by one, converges fast. CamP (Park et al. 2023) preconditions in the same way; here the image's depth gives the
 /// metric. A share of the mean diagonal is added, which damps directions that the image hardly determines.
 ///

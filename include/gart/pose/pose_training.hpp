@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// Poses of the training views, learned with the Gaussians. Adam moves the six numbers of the step's view
-/// (pose/pose.hpp) on the host (optim/host_adam.hpp), scaled by the metric of its image (pose/pose_metric.hpp). The
+/// (pose/pose.hpp) on the host (optim/host_adam.hpp). The metric of its image scales them (pose/pose_metric.hpp). The
 /// loss holds a pull to the capture's poses, with translations in units of the scene's extent.
 ///
 /// Moving, turning and scaling the whole capture with its scene changes no image, so no loss holds the views. So once

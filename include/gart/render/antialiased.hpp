@@ -1,9 +1,8 @@
 #pragma once
 /// \file
-/// A scene as the pixels of one view see it: the filter of the pixels (camera/model.hpp) widens every Gaussian once,
-/// before all else. So every tracer, footprint and box sees the same bits. Without a filter this is the scene itself,
-/// and nothing is launched. A frame has one (render/frame.hpp); the way back is the backward pass's
-/// (backward/finish.hpp).
+/// A scene as the pixels of one view see it. The pixels' filter (camera/model.hpp) widens every Gaussian once, before
+/// all else. So every tracer, footprint and box sees the same bits. Without a filter this is the scene itself, and
+/// nothing is launched. A frame has one (render/frame.hpp); the way back is the backward pass's (backward/finish.hpp).
 ///
 ///   antialiased<E> seen(exec);
 ///   auto const scene = seen.of(exec, stored, view, options.antialias);

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// An image's colour in 8 bits a channel, made where it was rendered: floats [H][W][3] to [H][W][3], or to [H][W][4]
-/// with 255 after red, green and blue. Clamped and rounded as to_8bit (io/image_file.hpp) does it; NaN becomes 0. Cost:
-/// a launch over the pixels.
+/// Converts an image's colour to 8 bits a channel where it was rendered. Floats [H][W][3] become [H][W][3], or
+/// [H][W][4] with 255 as a fourth channel. Clamped and rounded as to_8bit (io/image_file.hpp) does it; NaN becomes 0.
+/// Cost: a launch over the pixels.
 
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>

@@ -2,9 +2,9 @@
 /// \file
 /// The forward ray program: front-to-back compositing of the hits of a pixel,
 ///   C += T alpha c,  T *= 1 - alpha,
-/// colour from spherical harmonics on the ray's direction, until T < transmittance_min (the hit that crosses counts),
-/// or until max_hits of them where there is such a cap. The background is added with what transmittance is left. The
-/// effect of a hit on a ray is a template over the number: render/packet_composite.hpp applies it to a packet of rays.
+/// colour from spherical harmonics on the ray's direction. A ray ends when T < transmittance_min (the hit that crosses
+/// counts), or after max_hits where there is such a cap. The background is added with what transmittance is left. The
+/// effect of a hit on a ray is a template over the number. So render/packet_composite.hpp applies it to a packet.
 
 #include <gart/math/blend.hpp>
 #include <gart/math/sh.hpp>

@@ -9,7 +9,7 @@
 ///
 /// The scene's arrays and the policy must outlive the use of the frame. Cost of prepare: a launch over the Gaussians
 /// and the tracer's own preparation; of render: a ray a pixel. Memory: 64 bytes a Gaussian, 16 more where the options
-/// have a filter of the pixels, and the tracer's. Errors: invalid_argument for a camera or options that rays cannot be
+/// have a filter of the pixels, and the tracer's. Errors: invalid_argument for cameras and options that rays cannot be
 /// traced by, and for calls that need a prepared frame.
 
 #include <gart/exec/stage.hpp>

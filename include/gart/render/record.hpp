@@ -1,9 +1,8 @@
 #pragma once
 /// \file
 /// The record of each hit that the forward pass leaves for the backward pass; part of a method
-/// (backward/gradient_method.hpp). A record says where a hit belongs when it is found, and is called once a hit, after
-/// it has been composited. On hosts it also takes the hits of one Gaussian with a packet of rays at once
-/// (trace/packet_walk.hpp).
+/// (backward/gradient_method.hpp). A record says where a hit belongs when it is found. It is called once a hit, after
+/// compositing. On hosts it also takes the hits of one Gaussian with a packet of rays at once (trace/packet_walk.hpp).
 
 #include <gart/render/pixels.hpp>
 #include <gart/trace/hit.hpp>
@@ -43,8 +42,8 @@ concept hit_record = std::is_trivially_copyable_v<R> &&
   typename R::entry;                            // what a place holds, with a `name`
   typename R::cell;                             // as warp_program has it
   { r.place_of(id, at) } -> std::same_as<u32>;  // where the hit of Gaussian `id` at that pixel belongs
-  // The colour that the pixel would have if the hit were opaque, the hit's weight T alpha, its colour before the clamp.
-  // A record with depth also has the pixel's depth if the hit were opaque.
+  // The colour that the pixel would have if the hit were opaque. Then the hit's weight T alpha and its colour before
+  // the clamp. A record with depth also has the pixel's depth if the hit were opaque.
   r(place, color, weight, color);
 } && detail::packet_record<R>;
 

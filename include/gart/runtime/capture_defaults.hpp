@@ -47,8 +47,8 @@ struct decision {
 /// White for transparent images, as published results have it, and for plain white borders; else black.
 decision<background_kind> choose_background(capture_traits const& traits);
 
-/// The tiles tracer and every method but pixel need footprints, and so a lens that is one to one over the image.
-/// Where a lens folds: bvh and pixel. Else "auto", the fastest.
+/// The tiles tracer and every method but pixel need footprints. Footprints need a lens that is one to one over the
+/// image. Where a lens folds: bvh and pixel. Else "auto", the fastest.
 decision<tracer_kind> choose_tracer(capture_traits const& traits);
 /// The method for choose_tracer's tracer.
 decision<std::string> choose_backward(capture_traits const& traits);

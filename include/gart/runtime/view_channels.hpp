@@ -63,8 +63,8 @@ class view_channels {
   /// Of the view that is shown without a context.
   view_hits<E>& hits() { return hits_; }
 
-  /// Adds the channels' part to the moments of the Gaussians, and that of depth and transmittance where the colours'
-  /// pass left them out.
+  /// Adds the channels' part to the moments of the Gaussians. Where the colours' pass left out depth and transmittance,
+  /// adds these too.
   template <class Frame>
   void add_moments(Frame& frame, view_hits<E>& hits, output_gradients const& by, span<float> moments) {
     bool const channels = by.channels.any() && !by.channels.detached;

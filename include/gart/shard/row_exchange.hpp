@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Sends the rows that a round of a step needs from their owners to the ranks that trace them (work_units.hpp), and
-/// sums of gradients back.
+/// Sends the rows that a round of a step needs from their owners to the ranks that trace them (work_units.hpp). Sums of
+/// gradients go back.
 ///
 ///   row_exchange<E, Comm, 8, 3, response> rows(exec, comm, block);
 ///   rows.fetch(scene, views, names, options);  // `scene`: the rows of this rank
@@ -13,8 +13,8 @@
 ///   rows.sum_colors(0, views, share, sh_gradient, false);  // colours arrive last; or take_colors
 ///
 /// row_selection.hpp finds which rows go to which rank, row_messages.hpp sends them. Rows are put in the order of the
-/// Gaussians' numbers, so images have the bits of a single rank. Colours and their gradients, four fifths of the
-/// traffic, travel while lists are made and while owners finish the gradients of geometry. A rank that traces a whole
+/// Gaussians' numbers, so images have the bits of a single rank. Colours and their gradients are four fifths of the
+/// traffic. They travel while lists are made and while owners finish gradients of geometry. A rank that traces a whole
 /// view finishes those itself, and sends them in place of moments. Sums are added in the order of ranks. An `ordered`
 /// method also gets the bits of a single rank. Pairs that began in an earlier strip travel one by one, and the owner
 /// adds them to that strip's sum.

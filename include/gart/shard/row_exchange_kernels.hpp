@@ -106,8 +106,8 @@ struct pack_sums_body {
   }
 };
 
-// Finished gradients of geometry, instead of moments: a row's columns, the error in its place among moments, and last
-// the opacity's gradient.
+// Finished gradients of geometry, instead of moments. They are a row's columns, the error in its place among moments,
+// and last the opacity's gradient.
 static_assert(error_place == geometry_columns && moment_stride == geometry_columns + 2);
 
 // A row's k-th finished gradient: an element of `gradients`, or of `errors`.
@@ -209,8 +209,8 @@ struct keep_sums {
   }
 };
 
-// Packs finished gradients of a row, four places a lane: the sum over units, each a whole view, times the share. Errors
-// are not scaled, and are added one by one, in the order of rounds.
+// Packs finished gradients of a row, four places a lane. Each is the sum over units, each a whole view, times the
+// share. Errors are not scaled, and are added one by one, in the order of rounds.
 struct add_finished_body {
   returned_unit const* units;
   index_t count;

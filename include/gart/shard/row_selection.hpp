@@ -83,7 +83,7 @@ GART_HD inline u32 continued_pairs(footprint_slots range, image_rows const& rows
 // The place of a row that does not go to a unit.
 inline constexpr u32 not_sent = ~u32{0};
 
-// The exchange's bytes for each row of a rank, sent or not: a box a view, a place and its sum a unit.
+// The exchange's bytes for each row of a rank, sent or not. A view needs a box, a unit a place and its sum.
 constexpr u64 exchange_bytes_of_row(int views, int units) {
   return static_cast<u64>(views) * sizeof(footprint_slots) + static_cast<u64>(units) * (sizeof(u32) + sizeof(u64));
 }

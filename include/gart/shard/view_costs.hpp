@@ -5,7 +5,7 @@
 /// changes little between two visits. Images and gradients do not depend on the cut.
 ///
 /// box_kernel gives the costs. For each view they are the difference of each row's cost to the row above, in wrapping
-/// arithmetic, and one more number at the end. Views follow one another. Memory: 8 bytes a row of tiles.
+/// arithmetic. One more number stands at the end. Views follow one another. Memory: 8 bytes a row of tiles.
 
 #include <gart/core/isa.hpp>
 #include <gart/core/types.hpp>

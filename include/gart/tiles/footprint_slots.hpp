@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The footprint of a Gaussian in a view: its box of pixels, and how many pixels the boxes before it have. There its
-/// own slots begin in a buffer with one for each pixel (backward/hit_layout.hpp).
+/// The footprint of a Gaussian in a view: its box of pixels, and how many pixels the boxes before have. There its own
+/// slots begin in a buffer with one for each pixel (backward/hit_layout.hpp).
 
 #include <gart/tiles/grid.hpp>
 
@@ -20,7 +20,7 @@ struct alignas(16) footprint_slots {
   GART_HD constexpr footprint_slots(u64 before, pixel_box const& pixels, u16 past = 0)
       : offset(before & most), seam(past), box(pixels) {}
 
-  /// The columns by which the box is said to lie farther right than the pixels from `x1` on to the left of it.
+  /// The columns by which the box counts as farther right than pixels from `x1` on to its left.
   GART_HD GART_INLINE constexpr u32 columns_past(u32 x1) const { return x1 <= box.x0 ? static_cast<u32>(seam) : 0u; }
 };
 

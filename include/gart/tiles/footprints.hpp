@@ -1,8 +1,9 @@
 #pragma once
 /// \file
-/// The footprints of all Gaussians in one view: boxes with their place in the hit buffer, near depths, and how many
-/// (primitive, tile) pairs they make. Cost: one launch of double arithmetic over the Gaussians, through a lens another
-/// over those that it shows large, and two prefix sums. The host reads two totals, which size the buffers.
+/// The footprints of all Gaussians in one view: boxes with their place in the hit buffer, and near depths. Also the
+/// number of (primitive, tile) pairs they make. Cost: one launch of double arithmetic over the Gaussians, and two
+/// prefix sums. A lens needs another launch over those that it shows large. The host reads two totals, which size the
+/// buffers.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/camera/models.hpp>

@@ -5,7 +5,7 @@
 ///   of(i)                 what it needs of primitive i, for all its tiles
 ///   meets(p, cell, tile)  false only where no ray of the pair hits: `cell`, the box cut by the tile of this number
 ///
-/// A box of one row or one column of tiles has all of them: the silhouette is connected and touches the box's ends.
+/// A box of one row or one column of tiles has all of them. For the silhouette is connected and touches the box's ends.
 
 #include <gart/camera/models.hpp>
 #include <gart/math/silhouette.hpp>

@@ -23,7 +23,7 @@ struct tile_map_view {
   int depth_shift = 0;            ///< of depth_order: bits of a depth that keys leave out
   span<u32 const> longest_first;  ///< the tiles, if asked for (rank_tiles)
 
-  /// In lists sorted by depth_order: no hit of entry k, or of any after it in its list, has a smaller z.
+  /// In lists sorted by depth_order, a bound: hits of entry k and of later ones have at least this z.
   GART_HD GART_INLINE float depth(u32 k) const {
     return near_depth(keys[k] & ((u32{1} << order_bits) - 1), depth_shift);
   }
@@ -110,7 +110,7 @@ struct emit_pairs {
 };
 
 // Of sorted keys: where a tile's list begins, the first key that is not of a tile before it. Each lane looks for its
-// own tile. Most tiles may have no list, as in a strip of an image: whoever found the next one would fill them all.
+// own tile. Most tiles may have no list, as in a strip of an image. Whoever found the next list would fill them all.
 struct begin_lists {
   span<u32 const> keys;
   int order_bits;

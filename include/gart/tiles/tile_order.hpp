@@ -27,8 +27,8 @@ concept tile_order = std::is_trivially_copyable_v<O> &&
   { k.key(p, cell, tile) } -> std::same_as<u32>;
 };
 
-/// A depth (not negative) as an integer of the same order, `shift` low bits dropped; and the depth it stands for, which
-/// is not larger.
+/// A depth (not negative) as an integer of the same order, `shift` low bits dropped. And back: the depth it stands for,
+/// which is not larger.
 GART_HD GART_INLINE u32 depth_key(float depth, int shift) { return float_to_bits(depth) >> shift; }
 /// The depth that a key stands for.
 GART_HD GART_INLINE float near_depth(u32 key, int shift) { return bits_to_float(key << shift); }
@@ -125,7 +125,7 @@ class any_depth_order : public detail::depth_bits {
   tile_plane const* planes_;
 };
 
-/// The same for rays that begin where a moving camera is: those of a tile on a part of its way.
+/// The same for rays that begin at a moving camera: those of a tile on a part of its way.
 template <int Size>
 class moving_depth_order : public detail::depth_bits {
  public:
@@ -159,7 +159,7 @@ class moving_depth_order : public detail::depth_bits {
   origin_rays rays_;
 };
 
-/// The same for parallel rays: where on a ray the response is largest is linear in the pixel, so least at a corner.
+/// The same for parallel rays. Where the response is largest on a ray is linear in the pixel, so least at a corner.
 class parallel_depth_order : public detail::depth_bits {
  public:
   /// As depth_order's.

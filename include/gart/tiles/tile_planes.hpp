@@ -1,9 +1,8 @@
 #pragma once
 /// \file
 /// Where the rays of a tile pass, for cameras whose rays are no plane's grid. A plane lies across the tile's middle ray
-/// with a grid of pixels on it. A bound says how far any ray of the tile lies from its place there. Found from the rays
-/// themselves, each of them looked at: whatever the lens, every ray through pixels [x0, x1) x [y0, y1) of the tile
-/// passes through
+/// with a grid of pixels on it. A bound says how far any ray of the tile lies from its place there. It is found from
+/// each of the rays. Whatever the lens, every ray through pixels [x0, x1) x [y0, y1) of the tile passes through
 ///   origin + x dx + y dy,   x0 + inset - widen_x <= x <= x1 - inset + widen_x, y likewise, pixels counted from the
 ///   tile's,
 /// whose part along the middle ray is 1: what a hit's distance is at least is a bound of math/rectangle_depth.hpp.

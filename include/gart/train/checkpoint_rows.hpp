@@ -3,10 +3,10 @@
 /// The file format of a checkpoint: the position of one rank's rows, and their part of its checksums. The ranks agree
 /// by train/checkpoint_part.hpp; one rank by itself has all rows.
 ///
-/// The file is "gart checkpoint 2\\n", then named arrays, the last one named "end", and nothing after it. An array is,
-/// little endian: u64 length of the name, the name, u32 version of the content, u64 bytes, the bytes, u32 CRC-32C
-/// (io/crc32c.hpp) of everything before it. So one flipped bit is found. Files that begin with "gart checkpoint 1\\n",
-/// whose arrays have neither version nor checksum, are read too.
+/// The file is "gart checkpoint 2\\n", then named arrays, the last one named "end", and nothing after it. An array is
+/// little endian. It has the u64 length of the name, the name, u32 version of the content, u64 bytes, the bytes. Last
+/// comes the u32 CRC-32C (io/crc32c.hpp) of everything before it. So one flipped bit is found. Files that begin with
+/// "gart checkpoint 1\\n", whose arrays have neither version nor checksum, are read too.
 ///
 /// Errors: io_error naming the file and the array that is missing, truncated, damaged or of another size. The same for
 /// a version that is newer than the reader.

@@ -46,7 +46,7 @@ struct train_options {
   index_t max_gaussians = 1'000'000;           ///< never more than these
   index_t random_points = 100'000;             ///< where the capture has no points
   densify_kind densify = densify_kind::error;  ///< how their number grows
-  /// Weight in the loss of the square of the bands of colour above the first, halved, the mean over the Gaussians
+  /// Weight in the loss of the halved square of the bands above the first, its mean over the Gaussians
   /// (optim/adam.hpp). Rates of bands can then be eight times those of 3DGS without noise.
   float sh_penalty = 0.01f;
   int sh_every = 1000;  ///< a degree more after so many steps (or iterations / (10 * degrees) in shorter runs)

@@ -58,7 +58,7 @@ class basic_trainer {
   using frame_type = frame<E, Traits, Tracer>;         ///< the frame of a step's image
 
   /// Starts from `start`, whose degree the run keeps: sh_degree or lower. Errors: invalid_argument for a higher degree,
-  /// for no view to train on, and for options that several ranks do not support. out_of_memory.
+  /// for no view to train on, and for options that several ranks refuse. out_of_memory.
   basic_trainer(E& exec, train_options const& options, dataset const& data, start_model const& start,
                 Comm comm = Comm());
   /// The dataset must outlive the trainer.

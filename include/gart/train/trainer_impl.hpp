@@ -247,7 +247,7 @@ void basic_trainer<E, Traits, Tracer, Method, Comm>::trace(Plan& plan, loss_func
   frame_type& frame = tracing_.frame;
   frame.prepare(plan.scene(), v.seen, render, degree);
   plan.finish_fetch();
-  // Falls back to a smaller hit buffer, then to none, where it would exceed its budget or the largest slot number.
+  // Falls back to a smaller hit buffer, then to none, where one exceeds its budget or the largest slot number.
   tracing_.passes.with_room(frame, options_.hit_memory, [&]<class Pass>(Pass& pass) {
     plan.require(pass);
     pass.render(frame, targets);

@@ -5,10 +5,10 @@
 /// oversized ones are removed; opacities are reset from time to time.
 ///
 /// The statistic. 3DGS compares a threshold with the loss's gradient by the mean's screen position, in coordinates -1
-/// to 1. Ray tracing has no such variable, but sideways motion acts through it: with the mean at (x, y, z) in the
-/// camera, ndc_x = 2 (fx x / z + cx) / W - 1, so dL/dx = dL/dndc_x * 2 fx / (W z), hence
+/// to 1. Ray tracing has no such variable, but sideways motion acts through it. With the mean at (x, y, z) in the
+/// camera, ndc_x = 2 (fx x / z + cx) / W - 1. So dL/dx = dL/dndc_x * 2 fx / (W z), hence
 ///   dL/dndc = (dL/dx * z W / (2 fx), dL/dy * z H / (2 fy)),
-/// whose length is added up at every step that gives the Gaussian a gradient; the mean over those steps meets the same
+/// whose length is added up at every step that gives the Gaussian a gradient. The mean over those steps meets the same
 /// threshold as in 3DGS. A Gaussian whose mean is behind the camera adds nothing in that step.
 ///
 /// Past the budget the largest statistics grow and the rest stay as they are. New Gaussians begin with zero moments.

@@ -1,17 +1,17 @@
 #pragma once
 /// \file
-/// Densification as Markov chain Monte Carlo (Kheradmand et al., 3D Gaussian Splatting as Markov Chain Monte Carlo,
-/// 2024; constants as in gsplat). Dead Gaussians move onto live ones, drawn in proportion to opacity; growth to the
-/// budget draws in the same way. Every step moves the means at random, and penalizes opacity and size a little.
+/// Densification as Markov chain Monte Carlo. Source: Kheradmand et al., 3D Gaussian Splatting as Markov Chain Monte
+/// Carlo, 2024; constants as in gsplat. Dead Gaussians move onto live ones, drawn in proportion to opacity; growth to
+/// the budget draws in the same way. Every step moves the means at random, and penalizes opacity and size a little.
 ///
-/// A Gaussian of opacity o that becomes N in one place (its copies and itself; N is cut at 51) keeps its image:
+/// A Gaussian of opacity o may become N in one place: itself and its copies, N cut at 51. It keeps its image:
 ///   o' = 1 - (1 - o)^(1/N),  scale' = scale * o / sum_{j=1..N} C(N, j) (-1)^(j-1) o'^j / sqrt(j),
-/// which keeps the integral of the composited opacity across a line through the centre. (The paper's double sum, with
-/// sum_i C(i-1, j-1) = C(N, j).) For a generalised Gaussian of degree n (math/response.hpp) it is the n-th root of j.
-/// Moments as in gsplat. Growth keeps the moments of sources, and copies start without. Relocation clears the sources'
-/// moments and keeps those of moved Gaussians. A first moment fills up in 10 steps, a second one in 1,000. So cleared
-/// ones step up to 6.5 times their rate for a hundred steps. If growth cleared its sources, the best Gaussians would do
-/// so all the time (docs/training.md).
+/// which keeps the integral of the composited opacity across a line through the centre. It is the paper's double sum,
+/// with sum_i C(i-1, j-1) = C(N, j). For a generalised Gaussian of degree n (math/response.hpp) it is the n-th root of
+/// j. Moments as in gsplat. Growth keeps the moments of sources, and copies start without. Relocation clears the
+/// sources' moments and keeps those of moved Gaussians. A first moment fills up in 10 steps, a second one in 1,000. So
+/// cleared ones step up to 6.5 times their rate for a hundred steps. If growth cleared its sources, the best Gaussians
+/// would do so all the time (docs/training.md).
 ///
 /// Noise and the size penalty are in units of the scene's extent, so a capture in other units trains alike.
 ///
@@ -151,8 +151,8 @@ struct mcmc_penalty_kernel {
 
 }  // namespace detail
 
-/// The growth factor of a run that starts from `count` Gaussians. It is options.growth, or the larger factor that
-/// reaches the budget in the first two fifths of the densifications, at most 1.2.
+/// The growth factor of a run that starts from `count` Gaussians. It is options.growth, or a larger factor, at most
+/// 1.2. That one reaches the budget in the first two fifths of the densifications.
 inline float growth_for(mcmc_options const& options, index_t count, index_t max_gaussians, int iterations) {
   constexpr double steepest = 1.2;
   float const steps = options.until * static_cast<float>(iterations) - static_cast<float>(options.from);
