@@ -276,7 +276,7 @@ class tradeoff_run {
   progress say_;
   gart::model_file file_;
   gart::gaussian_model packed_;    // as it came back from the setting's format
-  std::uintmax_t file_bytes_ = 0;  // of the file
+  std::uintmax_t file_bytes_ = 0;  // of the model in that format
   std::vector<setting> settings_;
   view_set set_;
   std::string background_;

@@ -16,7 +16,7 @@ namespace gart { inline namespace GART_ISA {
 /// The slots of a packet.
 struct packet_entries {
   vec3_of<lanes> opaque;  ///< V
-  lanes weight;           ///< the weights
+  lanes weight;           ///< T alpha of the hits
   lane_mask clamped[3];   ///< channels of the hit's colour
 };
 

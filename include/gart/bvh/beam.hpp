@@ -20,7 +20,7 @@ struct beam {
   float by_least_slope[2];     ///< one over it, on the two other axes; finite
   float by_greatest_slope[2];  ///< the same of the greatest slope
   float least_stretch;         ///< distance along a ray over depth, the least of any ray
-  float greatest_stretch;      ///< the greatest
+  float greatest_stretch;      ///< the greatest of any ray
   float pad;                   ///< the greatest of any ray
 
   /// No ray is nearer than this at a distance along it.

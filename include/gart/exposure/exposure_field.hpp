@@ -29,7 +29,7 @@ struct view_exposure {
   std::string name;         ///< of the view
   vec3d position{0.0};      ///< the camera's
   vec3 direction{0, 0, 1};  ///< its axis, a unit vector
-  exposure value;           ///< its exposure
+  exposure value;           ///< relative to the scene's colours
 };
 
 /// The falloff of a lens of the capture, and the numbers that identify the lens.

@@ -50,7 +50,7 @@ struct dataset {
   std::string format;                     ///< "COLMAP", "Blender", "nerfstudio"
   std::string split;                      ///< how train and test were told apart, in words
   std::string resize_filter;              ///< "none", or "box (1/4)"
-  std::vector<dataset_view> train, test;  ///< views
+  std::vector<dataset_view> train, test;  ///< views to learn from, and views to score
   point_cloud points;                     ///< empty: start at random
   std::vector<std::string> notes;         ///< one line each: what was skipped, scaled or assumed
   vec3d origin{0.0};                      ///< what cameras and points are from, in the capture's coordinates
@@ -97,7 +97,7 @@ struct dataset_options {
   std::optional<vec3d> origin = {};   ///< to hold the capture from, as a model's; none: its own (io/origin.hpp)
   bool masks = true;                  ///< those that the files name, else those in a folder masks beside the photos'
   bool load_images = true;       ///< false: cameras alone, for which photos may all be absent if the files state sizes
-  depth_map_options depth = {};  ///< maps of depth
+  depth_map_options depth = {};  ///< whether maps are read, and what they measure
   /// Called from the loading threads, one at a time.
   std::function<void(std::size_t done, std::size_t total)> progress = {};
   /// The ranks of one host that load the same capture. They share the decoding of images, and hold them once where the

@@ -33,7 +33,7 @@ namespace gart { inline namespace GART_ISA {
 /// sum over its hits of w times the pixel's error. By it densification finds where more are needed. Then one of padding
 /// (16-byte words).
 inline constexpr int moment_count = 11;
-inline constexpr int error_place = 10;    ///< the place of the error
+inline constexpr int error_place = 10;    ///< number of the error among them
 inline constexpr int moment_stride = 12;  ///< floats a Gaussian
 
 /// The share of one hit in the sums; of one hit, or of one a lane.

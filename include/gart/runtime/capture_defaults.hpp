@@ -72,7 +72,7 @@ decision<index_t> choose_budget(dataset const& data, train_options const& option
 
 /// All choices for a capture, as `gart train` takes them. Callers may change them afterwards.
 struct recommendation {
-  configuration_request request;  ///< the configuration
+  configuration_request request;  ///< for make_session
   train_options options;          ///< options with the choices
   validation measured;            ///< the trials behind them
 };

@@ -15,7 +15,7 @@ struct view_hits {
   /// None yet.
   explicit view_hits(E& exec) : counts(exec), table(exec) {}
   buffer<u32, E> counts;       ///< [H][W]
-  hit_table<E> table;          ///< the hits
+  hit_table<E> table;          ///< a ray a pixel, row-major
   bool is_listed = false;      ///< they are those of the view
   gaussian_channels channels;  ///< that could be shown
 

@@ -65,7 +65,7 @@ struct camera {
 /// A camera of a file.
 struct named_camera {
   std::string name;  ///< unique in the file
-  camera view;       ///< the camera
+  camera view;       ///< its pose, lens and size
 };
 
 /// The fault of a camera and its remedy; null where there is none.

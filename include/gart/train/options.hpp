@@ -80,7 +80,7 @@ struct train_options {
   resolution_options resolution = {};               ///< of a step's images
   render_options render = {};                       ///< of a step's views; near, background and rows are the run's own
   learning_rates rates = {};                        ///< of Adam, by group of parameters
-  adam_options adam = {};                           ///< of Adam
+  adam_options adam = {};                           ///< how its steps differ by Gaussian and band
   pose_options poses = {};                          ///< of learned poses
   lens_options lens = {};                           ///< of learned lenses
   error_growth_options error = {};                  ///< of growth by error

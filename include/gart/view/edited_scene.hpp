@@ -16,7 +16,7 @@
 
 namespace gart {
 
-/// The scene.
+/// A scene and its file's text, changed together.
 class edited_scene {
  public:
   /// `read` is what was read of the file, from `read.scene` on less `origin`. `model` is one more than the file names;

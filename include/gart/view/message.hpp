@@ -51,7 +51,7 @@ struct image_message {
 /// The point that is seen through one of a view's pixels is to be found.
 struct pick_message {
   u64 id = 0;              ///< of the message
-  camera view;             ///< the view
+  camera view;             ///< that the pixel is of
   float x = 0, y = 0;      ///< image point, pixels
   view_settings settings;  ///< how it differs from the model
 };
@@ -137,7 +137,7 @@ struct frame_header {
   float low = 0, high = 0;              ///< values at the ends of the colour map, where it has one
   int samples = 1, samples_of = 1;      ///< paths a pixel that it has, and that it is to have at rest
 };
-/// The bytes of a frame.
+/// The binary message of an image: a u32 length, the header as JSON, the image's file.
 std::vector<u8> frame_bytes(frame_header const& header, std::vector<u8> const& image);
 
 }  // namespace gart

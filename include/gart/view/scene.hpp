@@ -84,7 +84,7 @@ struct view_settings {
 /// A camera of the capture.
 struct view_camera {
   std::string name;    ///< the capture's camera
-  camera view;         ///< the camera
+  camera view;         ///< its pose, lens and size
   bool test = false;   ///< held out of the training
   bool photo = false;  ///< whether it has a photograph
 };

@@ -51,8 +51,8 @@ struct part_needs {
 
 /// The learned colour corrections of a run's photographs.
 struct learned_colors {
-  std::vector<view_exposure> views;    ///< exposures
-  std::vector<lens_falloff> falloffs;  ///< falloffs of lenses
+  std::vector<view_exposure> views;    ///< of the views that steps have moved
+  std::vector<lens_falloff> falloffs;  ///< of the lenses that steps have moved
 };
 
 /// The cameras of the training views.
