@@ -49,7 +49,7 @@ class backward_pass {
   using record_type = typename Method::template record<tile_size>;  ///< what the forward pass leaves of a hit
   static constexpr bool records = Method::gather::any;              ///< whether it leaves anything
   static constexpr bool ordered = records && Method::ordered;    ///< sums in a fixed order: the same bits in every run
-  static constexpr slot_validity validity = Method::validity;    ///< how slots that are hits are told from others
+  static constexpr slot_validity validity = Method::validity;    ///< how slots of hits are recognised
   static constexpr bool of_depth = has_depth<Method>;            ///< whether depth has a gradient
   static constexpr bool records_depths = Method::gather::depth;  ///< whether the forward pass leaves a depth a hit
 

@@ -56,7 +56,7 @@ struct method_gather {
       tile_size = TileSize;                                         ///< side of a tile, in pixels
   /// In an order or atomically.
   static constexpr gather_sums sums = Method::ordered ? gather_sums::ordered : gather_sums::atomic;
-  static constexpr slot_validity validity = Method::validity;  ///< how slots that are hits are told
+  static constexpr slot_validity validity = Method::validity;  ///< how slots of hits are recognised
   /// Of the kernel.
   static constexpr kernel_form form = Method::lane_by_lane || !Rays::central ? kernel_form::plain : E::form;
   using rays = Rays;  ///< of the view's pixels

@@ -21,7 +21,7 @@ enum class slot_validity { cleared, recomputed };
 struct gradient_method_base {
   static constexpr bool ordered = false;       ///< sums in a fixed order: the same bits in every run
   static constexpr bool lane_by_lane = false;  ///< by the plain gather, whatever the policy (backward/gather_form.hpp)
-  static constexpr slot_validity validity = slot_validity::cleared;  ///< how slots that are hits are told
+  static constexpr slot_validity validity = slot_validity::cleared;  ///< how slots of hits are recognised
   using fallback = void;  ///< the method that a step is done by where the hit buffer has no room
 };
 

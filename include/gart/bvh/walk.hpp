@@ -64,7 +64,7 @@ GART_HD GART_INLINE u32 near_to_far(u32 wanted, float const (&entry)[bvh_width])
   return order;
 }
 
-/// Walks the tree along a ray; the visitor is told of leaves.
+/// Walks the tree along a ray; the visitor takes its leaves.
 template <class Ray, class Visitor>
 GART_HD GART_INLINE void walk(bvh_view const& tree, Ray const& r, Visitor& visitor) {
   if (tree.count == 0) return;
