@@ -19,6 +19,31 @@ struct intrinsics {
   float fx = 0, fy = 0, cx = 0, cy = 0;  ///< as camera has them
 };
 
+/// The members of models with focal lengths and a principal point.
+struct focal_base : camera_base {
+  float fx = 0, fy = 0, cx = 0, cy = 0;  ///< as intrinsics
+  mat3 rotation{1.0f};                   ///< camera to world; columns are the camera's axes
+
+  /// Focal lengths and principal point.
+  intrinsics focal() const { return {fx, fy, cx, cy}; }
+
+ protected:
+  ///@{
+  /// From the run-time camera.
+  focal_base() = default;
+  GART_HD explicit focal_base(camera const& c)
+      : camera_base(c), fx(c.fx), fy(c.fy), cx(c.cx), cy(c.cy), rotation(c.rotation) {}
+  ///@}
+  /// Size, focal lengths or principal point.
+  camera_fault image_fault() const {
+    if (camera_fault const size = size_fault(*this); size.what) return size;
+    if (!(fx > 0 && fy > 0 && is_finite(fx) && is_finite(fy)))
+      return {"the focal length is not a positive number", "correct fx and fy"};
+    if (!(is_finite(cx) && is_finite(cy))) return {"the principal point is not finite", "correct cx and cy"};
+    return {};
+  }
+};
+
 /// Derivatives of a ray, in world axes.
 struct ray_slopes {
   vec3 direction_x{0.0f}, direction_y{0.0f};  ///< of the unit direction

@@ -156,14 +156,6 @@ inline camera_fault pose_fault(vec3d const& position, mat3 const& rotation) {
   return {};
 }
 
-/// Of a camera with focal lengths and a principal point.
-inline camera_fault focal_fault(float fx, float fy, float cx, float cy) {
-  if (!(fx > 0 && fy > 0 && is_finite(fx) && is_finite(fy)))
-    return {"the focal length is not a positive number", "correct fx and fy"};
-  if (!(is_finite(cx) && is_finite(cy))) return {"the principal point is not finite", "correct cx and cy"};
-  return {};
-}
-
 /// Throws invalid_argument for a near distance that is not positive and finite.
 inline void require_near(float near) {
   if (!(near > 0 && is_finite(near))) throw invalid_argument("footprints: near must be positive and finite");

@@ -81,22 +81,13 @@ struct orthographic_slopes {
 };
 
 /// The model.
-struct orthographic : camera_base {
-  float fx = 0, fy = 0, cx = 0, cy = 0;  ///< pixels a world unit, principal point
-  mat3 rotation{1.0f};                   ///< camera to world; columns are the camera's axes
-  bool rolls = false;                    ///< a rolling shutter was asked for
+struct orthographic : focal_base {
+  bool rolls = false;  ///< a rolling shutter was asked for
 
   ///@{
   /// From the run-time camera.
   orthographic() = default;
-  GART_HD explicit orthographic(camera const& c)
-      : camera_base(c),
-        fx(c.fx),
-        fy(c.fy),
-        cx(c.cx),
-        cy(c.cy),
-        rotation(c.rotation),
-        rolls(c.shutter != shutter_kind::global) {}
+  GART_HD explicit orthographic(camera const& c) : focal_base(c), rolls(c.shutter != shutter_kind::global) {}
   ///@}
 
   /// Through the image point (u, v), in pixels.
@@ -108,8 +99,6 @@ struct orthographic : camera_base {
     return out;
   }
 
-  /// Focal lengths and principal point.
-  intrinsics focal() const { return {fx, fy, cx, cy}; }
   /// How rays change with their image points.
   orthographic_slopes slopes() const { return {rotation}; }
 
@@ -127,8 +116,7 @@ struct orthographic : camera_base {
 
   /// Size, focal lengths, principal point, pose or shutter.
   camera_fault fault() const {
-    if (camera_fault const size = size_fault(*this); size.what) return size;
-    if (camera_fault const focal = focal_fault(fx, fy, cx, cy); focal.what) return focal;
+    if (camera_fault const image = image_fault(); image.what) return image;
     if (rolls) return {"an orthographic camera has no rolling shutter", "make its shutter GLOBAL"};
     return pose_fault(position, rotation);
   }

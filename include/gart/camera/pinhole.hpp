@@ -32,15 +32,11 @@ GART_HD GART_INLINE primary_ray_of<F> ray_of_slopes(mat3 const& rotation, F x, F
 }
 
 /// A camera without a lens.
-struct pinhole : camera_base {
-  float fx = 0, fy = 0, cx = 0, cy = 0;  ///< focal lengths and principal point, pixels
-  mat3 rotation{1.0f};                   ///< camera to world; columns are the camera's axes
-
+struct pinhole : focal_base {
   ///@{
   /// From the run-time camera.
   pinhole() = default;
-  GART_HD explicit pinhole(camera const& c)
-      : camera_base(c), fx(c.fx), fy(c.fy), cx(c.cx), cy(c.cy), rotation(c.rotation) {}
+  GART_HD explicit pinhole(camera const& c) : focal_base(c) {}
   ///@}
 
   /// Through the image point (u, v), in pixels.
@@ -49,8 +45,6 @@ struct pinhole : camera_base {
     return ray_of_slopes(rotation, divide(add(u, F(-cx)), F(fx)), divide(add(v, F(-cy)), F(fy)));
   }
 
-  /// Focal lengths and principal point.
-  intrinsics focal() const { return {fx, fy, cx, cy}; }
   /// How rays change with their image points.
   lens_slopes slopes() const { return {camera_kind::perspective, {}, rotation}; }
 
@@ -68,8 +62,7 @@ struct pinhole : camera_base {
 
   /// Size, focal lengths, principal point or pose.
   camera_fault fault() const {
-    if (camera_fault const size = size_fault(*this); size.what) return size;
-    if (camera_fault const focal = focal_fault(fx, fy, cx, cy); focal.what) return focal;
+    if (camera_fault const image = image_fault(); image.what) return image;
     return pose_fault(position, rotation);
   }
 

@@ -2,8 +2,8 @@
 /// \file
 /// The rays of a view's pixels, as kernels take them, whatever the camera. Kernels cast a pinhole's rays themselves.
 /// Any other model with one centre casts its rays once a view into a table of directions, 12 bytes a pixel. So a kernel
-/// knows one model, and a lens that is costly to invert is inverted once a pixel. Rays without one centre have a table of
-/// origins too. They have a type of their own, so that kernels for other rays stay as they are.
+/// knows one model, and a lens that is costly to invert is inverted once a pixel. Rays without one centre have a table
+/// of origins too. They have a type of their own, so that kernels for other rays stay as they are.
 
 #include <gart/camera/models.hpp>
 #include <gart/exec/buffer.hpp>

@@ -32,26 +32,15 @@ GART_HD inline vec3 unit_in_world(mat3 const& rotation, fixed_double x, fixed_do
 }
 
 /// The model.
-struct radial_lens : camera_base {
-  float fx = 0, fy = 0, cx = 0, cy = 0;  ///< focal lengths and principal point, pixels
-  mat3 rotation{1.0f};                   ///< camera to world; columns are the camera's axes
-  camera_kind kind{};                    ///< which curve
-  distortion lens;                       ///< its parameters
-  lens_curve curve;                      ///< what they make
-  double most_q = 0, most_r = 0;         ///< where rays end
+struct radial_lens : focal_base {
+  camera_kind kind{};             ///< which curve
+  distortion lens;                ///< its parameters
+  lens_curve curve;               ///< what they make
+  double most_q = 0, most_r = 0;  ///< where rays end
 
   radial_lens() = default;
   /// From the run-time camera. Host side.
-  explicit radial_lens(camera const& c)
-      : camera_base(c),
-        fx(c.fx),
-        fy(c.fy),
-        cx(c.cx),
-        cy(c.cy),
-        rotation(c.rotation),
-        kind(c.kind),
-        lens(c.lens),
-        curve(c.kind, c.lens) {
+  explicit radial_lens(camera const& c) : focal_base(c), kind(c.kind), lens(c.lens), curve(c.kind, c.lens) {
     if (fault().what) return;
     lens_bounds const seen = whole();
     most_q = seen.farthest_q(), most_r = seen.farthest_r();
@@ -86,8 +75,6 @@ struct radial_lens : camera_base {
     return std::hypot((double{u} - cx) / fx, (double{v} - cy) / fy) <= most_r;
   }
 
-  /// Focal lengths and principal point.
-  intrinsics focal() const { return {fx, fy, cx, cy}; }
   /// How rays change with their image points.
   lens_slopes slopes() const { return {kind, lens, rotation}; }
 
@@ -110,8 +97,7 @@ struct radial_lens : camera_base {
 
   /// Size, focal lengths, principal point, pose or a parameter of the lens.
   camera_fault fault() const {
-    if (camera_fault const size = size_fault(*this); size.what) return size;
-    if (camera_fault const focal = focal_fault(fx, fy, cx, cy); focal.what) return focal;
+    if (camera_fault const image = image_fault(); image.what) return image;
     for (float const k : {lens.k1, lens.k2, lens.k3, lens.k4, lens.k5, lens.k6, lens.p1, lens.p2, lens.d1, lens.d2,
                           lens.d3, lens.s1, lens.s2, lens.s3, lens.s4})
       if (!is_finite(k))
