@@ -4,32 +4,34 @@
 /// else follows from its members: tracers, tile lists, footprints, the backward passes and antialiasing know no model
 /// by name. camera/models.hpp goes from the run-time camera (scene/camera.hpp) to its model.
 ///
-/// A model derives from camera_base and has, F being float or, on hosts, lanes:
+/// A model derives from camera_base; one with focal lengths from focal_base (camera/lens_slopes.hpp). With F float or,
+/// on hosts, lanes it has:
 ///   template <class F> primary_ray_of<F> ray(F u, F v) const
-///     The ray through the image point (u, v), in pixels; its unit direction is in world axes and decides hits, so its
-///     arithmetic is fixed (math/arith.hpp), the same bits for a lane as for one point. A model without arithmetic for
-///     lanes calls each_lane. A direction of zeros is a ray that there is none of: it hits nothing. A camera whose rays
-///     do not share one point returns `ray` for a float, whose origin is relative to `position`: tracers, compositing
+///     The ray through the image point (u, v), in pixels, with its unit direction in world axes. It decides hits, so
+///     its arithmetic is fixed (math/arith.hpp): the same bits for a lane as for one point. A model without arithmetic
+///     for lanes calls each_lane. A direction of zeros means that there is no ray: it hits nothing. A camera whose rays
+///     do not share one point returns `ray` for a float, whose origin is relative to `position`. Tracers, compositing
 ///     and gradients take such rays too (origin_rays).
 ///   bounds(float near) const
-///     Host side: a trivially copyable footprint operator()(ellipsoid const&) const for kernels, the box of all pixels
-///     whose rays can hit the ellipsoid at t > near, and a lower bound of the depths of these hits. Conservative for
-///     rays in float: math/footprint.hpp says by how much to widen. Where few ellipsoids take far longer than the
-///     rest it may also have footprint narrow(ellipsoid const&, bool& wide) const, which sets `wide` for these instead:
-///     kernels take them in a launch of their own (tiles/footprints.hpp).
+///     Host side: a trivially copyable footprint operator()(ellipsoid const&) const for kernels. It gives the box of
+///     all pixels whose rays can hit the ellipsoid at t > near, and a lower bound of these hits' depths. It is
+///     conservative for rays in float: math/footprint.hpp says by how much to widen. Where few ellipsoids take far
+///     longer than the rest it may also have footprint narrow(ellipsoid const&, bool& wide) const. That sets `wide` for
+///     these instead, and kernels take them in a launch of their own (tiles/footprints.hpp).
 ///   ray_depth depth() const
 ///     What those depths are measured along (camera/ray_depth.hpp). camera_base has the distance along the ray.
 ///   filter(float pixels) const
-///     Host side: how far so many pixels reach, pixels x the root of a pixel's solid angle x distance, at a point
-///     relative to `position`: trivially copyable, float sigma_at(vec3), filter_at at(vec3) with its change, vec3
-///     from_camera(gaussian_parameters). Beside the image it goes on as at the image's nearest border.
+///     Host side: how far so many pixels reach at a point relative to `position`. That is pixels x the root of a
+///     pixel's solid angle x distance. It is trivially copyable. It has float sigma_at(vec3), filter_at at(vec3) with
+///     its change, and vec3 from_camera(gaussian_parameters). Beside the image it goes on as at the image's nearest
+///     border.
 ///   camera_fault fault() const
 ///     What no ray can be cast by.
 ///   bool one_to_one() const
 ///     Host side: whether no two pixels see one direction, and each sees one. Footprints need it. camera_base has true.
 ///   slopes() const, intrinsics focal() const
-///     Of a camera with focal lengths and a principal point: how its rays change with their image points
-///     (camera/lens_slopes.hpp), by which these are learned.
+///     How the rays of a camera with focal lengths and a principal point change with their image points
+///     (camera/lens_slopes.hpp). By these a lens is learned.
 ///
 /// Which pixels of a tile come how near an ellipsoid needs no member: tiles/tile_planes.hpp has it from the rays.
 /// Kernels cast a pinhole's rays themselves; those of other models are cast once a view (camera/pixel_rays.hpp). Rays

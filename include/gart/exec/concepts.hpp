@@ -14,7 +14,7 @@
 ///   void begin_stage(label); void end_stage();                 brackets of a timed stage, nested (see stage.hpp)
 ///   template <class T> static T atomic_add(T*, T);             in kernels: returns the old value
 ///   template <int N> static void atomic_add_row(float* row, float const (&values)[N], int n);
-///       in kernels: row[0..n) += values as one row; values past n are zero; a row of a multiple of 4 floats is aligned
+///       in kernels: row[0..n) += values as one row. Values past n are zero. A row of a multiple of 4 floats is aligned
 ///       to 16 bytes, and no other function adds to it in the same launch
 ///   static void fence();                   in kernels: what was written before is seen by who sees what comes after
 ///   profiler profile; memory_use memory;
@@ -23,7 +23,7 @@
 ///   void* workspace(bytes);                a block lent to the algorithm that runs; the next call lends it again
 ///   int threads();                         how many an algorithm may split an array over
 ///   template <class F> static void exclusively(void const* what, F f);
-///       in kernels: calls f while no other thread is in a call for the same `what`; in f there is no call of it
+///       in kernels: calls f while no other thread is in a call for the same `what`. f itself makes no such call
 /// and one of a device (device_execution)
 ///   int multiprocessors();                 by which kernels that stay on the device are launched
 /// copy_out waits for the data; all else is ordered on the queue. The source of copy_in may be reused on return.
