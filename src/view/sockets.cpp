@@ -32,7 +32,7 @@ constexpr char const* protocol_name = "gart-view";
 constexpr int send_buffer = 256 * 1024;
 // Connections that are no viewers: the one that was longest of no use makes room for the next.
 constexpr std::size_t requests_most = 64;
-// Limits in seconds. First a request's head and each part of its answer; then a viewer's silence until it is asked, and
+// Limits in seconds. First a request's head and each part of its answer. Then a viewer's silence until it is asked, and
 // until it is closed. Then a viewer that reads nothing, and a close.
 constexpr double request_seconds = 15, ping_seconds = 20, unheard_seconds = 60, stalled_seconds = 30, close_seconds = 2;
 constexpr int tick_ms = 250;

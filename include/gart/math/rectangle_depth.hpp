@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// How near rays from one point can hit a Gaussian where they pass through a parallelogram of a plane. All points d = u
-/// x + v y + z, u and v of a rectangle, have a factor by which their ray reaches the hit. This is a lower bound of it.
-/// For the axes x, y, z of a camera, u and v are slopes. The factor is then the hit's depth in camera space.
+/// How near rays from one point can hit a Gaussian where they pass through a parallelogram of a plane. A ray through d
+/// = u x + v y + z reaches its hit at some factor times d. This is a lower bound of that factor for all u and v of a
+/// rectangle. For the axes x, y, z of a camera, u and v are slopes. The factor is then the hit's depth in camera space.
 ///
 /// With rows m_k of M the factor at the largest response is
 ///   N / Q,  N = -sum_k o_k (m_k . d),  Q = sum_k (m_k . d)^2.
