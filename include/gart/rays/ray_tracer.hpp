@@ -283,24 +283,27 @@ class ray_tracer {
     kept_batch<E>& kept = context.kept;
     index_t const n = context.rays.count();
     constexpr u64 run = keep_hits<E>::run;
-    kept.ray_bits = std::max(1, static_cast<int>(std::bit_width(n - (n > 0))));
-    kept.used.resize(1);
+    kept.used.resize(2), kept.counts.resize(n), kept.offsets.resize(n);
     u64 room = std::max<u64>(static_cast<u64>(per_ray_ * n * 1.125) / run * run + run, run);
     for (;;) {
-      kept.keys.resize(room), kept.entries.resize(room), kept.depths.resize(room);
+      kept.ids.resize(room), kept.entries.resize(room), kept.depths.resize(room);
+      kept.run_rays.resize(room / run), kept.run_firsts.resize(room / run);
       kept.used.zero();
       launch("rays/forward", context.rays,
              composite_of<keep_hits<E>>(context.rays, context.options, out,
-                                        {kept.keys.data(), kept.entries.data(), kept.depths.data(), kept.used.data(),
-                                         room, kept.ray_bits, u64{scene_.count} << kept.ray_bits}));
-      kept.count = kept.used.front();
-      if (kept.count >= 0xffffffffu)
-        throw out_of_memory("hit", kept.count * 32, 0,
+                                        {kept.ids.data(), kept.entries.data(), kept.depths.data(), kept.run_rays.data(),
+                                         kept.run_firsts.data(), kept.counts.data(), kept.used.data(), room}));
+      exclusive_scan(*exec_, span<u32 const>(kept.counts), kept.offsets.view(), kept.used.view().subspan(1, 1));
+      u64 used[2];
+      exec_->copy_out(used, kept.used.data(), sizeof used);
+      kept.taken = used[0], kept.count = used[1];
+      if (kept.taken >= 0xffffffffu)
+        throw out_of_memory("hit", kept.taken * 32, 0,
                             "more than 2^32 hits of a batch: trace fewer rays at a time, or by gradient_form::scatter");
-      if (kept.count <= room) break;
-      room = kept.count;
+      if (kept.taken <= room) break;
+      room = kept.taken;
     }
-    if (n > 0) per_ray_ = static_cast<double>(kept.count) / n;
+    if (n > 0) per_ray_ = static_cast<double>(kept.taken) / n;
   }
 
   E* exec_;
