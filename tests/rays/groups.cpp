@@ -70,3 +70,28 @@ TEST_CASE_TEMPLATE("eight lanes a ray meet boxes that all overlap", E, GART_TEST
   CHECK(same(by_groups(exec, scene, tracer, batch.rays(), {}), wanted));
   CHECK(*std::max_element(wanted.hits.begin(), wanted.hits.end()) > 500);
 }
+
+TEST_CASE_TEMPLATE("lists are the same where one walk makes them, and where there is too little room for that", E,
+                   GART_TEST_POLICIES) {
+  E exec;
+  gart::gaussians<E> const scene(exec, cloud(5, 2, 2000));
+  random_rays const rays(11, 999, 2.0f);
+  batch_memory<E> const batch(exec, {}, rays.origins, rays.directions);
+  gart::render_options two_hits;
+  two_hits.max_hits = 2;
+  auto const list = [&](gart::ray_tracer<E>& tracer, gart::render_options const& options) {
+    return tracer.list(batch.rays(), options).to_host();
+  };
+  auto const equal = [](gart::hit_lists const& a, gart::hit_lists const& b) {
+    return a.offsets == b.offsets && a.ids == b.ids && a.t == b.t && a.alpha == b.alpha && a.weight == b.weight;
+  };
+  gart::ray_tracer<E> tracer(exec), fresh(exec);
+  tracer.set_scene(scene.view(), 2), fresh.set_scene(scene.view(), 2);
+  gart::hit_lists const in_two_walks = list(tracer, {});
+  CHECK(in_two_walks.ids.size() > 10 * 999);
+  CHECK(equal(list(tracer, {}), in_two_walks));  // there is room now
+  gart::hit_lists const few = list(tracer, two_hits);
+  CHECK(equal(few, list(fresh, two_hits)));
+  CHECK(equal(list(tracer, {}), in_two_walks));  // too little
+  CHECK(equal(list(tracer, {}), in_two_walks));
+}

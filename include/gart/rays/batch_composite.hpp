@@ -9,8 +9,8 @@
 #include <gart/math/blend.hpp>
 #include <gart/math/sh.hpp>
 #include <gart/rays/batch_rays.hpp>
+#include <gart/rays/hit_runs.hpp>
 #include <gart/render/composite.hpp>
-#include <gart/trace/lane_group.hpp>
 
 namespace gart { inline namespace GART_ISA {
 
@@ -39,69 +39,37 @@ struct keep_none {
   struct state {};                    ///< nothing
 };
 
-/// Keeps what the gradient needs of each hit, for a sum by Gaussian (rays/batch_gather.hpp). Rays take places a run at
-/// a time, in no order, and say whose a run is and where in the ray it begins. Where there are more hits than places,
-/// the rest is counted, not written.
+/// Keeps what the gradient needs of each hit, for a sum by Gaussian (rays/batch_gather.hpp).
 template <execution E>
 struct keep_hits {
   static constexpr bool any = true;  ///< some are kept
-  static constexpr u32 run = 16;     ///< places that a ray takes at a time
-  static_assert(run >= group_lanes);
   /// What is kept of one.
   struct hit {
     hit_entry entry;  ///< of its colour
     float depth;      ///< that the ray would have if the hit were opaque
     u32 id;           ///< the Gaussian
   };
-  /// Of a ray: its next place, and how many it has left.
-  struct state {
-    u64 at = 0;    ///< place
-    u32 left = 0;  ///< places
-  };
-  u32* ids = nullptr;            ///< [capacity]: Gaussians
-  hit_entry* entries = nullptr;  ///< [capacity]
-  float* depths = nullptr;       ///< [capacity]
-  u32* run_rays = nullptr;       ///< [capacity / run]: whose it is
-  u32* run_firsts = nullptr;     ///< [capacity / run]: the number in its ray of the first hit
-  u32* counts = nullptr;         ///< [R]: hits of the rays
-  u64* used = nullptr;           ///< places that rays have taken
-  u64 capacity = 0;              ///< a multiple of run
+  using state = typename run_writer<E>::state;  ///< of a ray
+  run_writer<E> runs;                           ///< where they go
+  u32* ids = nullptr;                           ///< [places]: Gaussians
+  hit_entry* entries = nullptr;                 ///< [places]
+  float* depths = nullptr;                      ///< [places]
 
   /// Keeps a hit of a ray, that of number k.
   GART_KERNEL GART_INLINE void keep(state& s, index_t ray_number, u32 k, hit const& h) const {
-    if (s.left == 0) s.at = take_run(ray_number, k), s.left = run;
-    write(s.at, h);
-    ++s.at, --s.left;
+    runs.put(s, ray_number, k, [&](u64 at) { write(at, h); });
   }
-  /// Keeps so many hits of a ray from number `first`, a lane each (trace/lane_group.hpp).
-  GART_KERNEL GART_INLINE void keep_together(state& s, index_t ray_number, u32 first, int count,
+  /// Keeps so many hits of a ray from number `first`, a lane each.
+  GART_KERNEL GART_INLINE void keep_together(state& s, index_t ray_number, u32 first, u32 count,
                                              group_values<hit>& hits) const {
-    u32 const new_hits = static_cast<u32>(count);
-    bool const runs_out = new_hits > s.left;
-    group_values<u64> taken;
-    each_in_group([&](int l) {
-      taken[l] = 0;
-      if (l == 0 && runs_out) taken[l] = take_run(ray_number, first + s.left);
-    });
-    u64 const next = of_lane(taken, 0) - s.left;  // as if it followed on
-    each_in_group([&](int l) {
-      u32 const k = static_cast<u32>(l);
-      if (k < new_hits) write((k < s.left ? s.at : next) + k, hits[l]);
-    });
-    s.at = (runs_out ? next : s.at) + new_hits;
-    s.left = s.left + (runs_out ? run : 0) - new_hits;
+    runs.put_together(s, ray_number, first, count, [&](int l, u64 at) { write(at, hits[l]); });
   }
   /// After the last one.
-  GART_KERNEL GART_INLINE void end(index_t ray_number, u32 hits) const { counts[ray_number] = hits; }
+  GART_KERNEL GART_INLINE void end(index_t ray_number, u32 hits) const { runs.counts[ray_number] = hits; }
 
  private:
-  GART_KERNEL GART_INLINE u64 take_run(index_t ray_number, u32 first) const {
-    u64 const at = E::atomic_add(used, u64{run});
-    if (at < capacity) run_rays[at / run] = ray_number, run_firsts[at / run] = first;
-    return at;
-  }
   GART_KERNEL GART_INLINE void write(u64 at, hit const& h) const {
-    if (at < capacity) ids[at] = h.id, entries[at] = h.entry, depths[at] = h.depth;
+    ids[at] = h.id, entries[at] = h.entry, depths[at] = h.depth;
   }
 };
 
@@ -170,8 +138,8 @@ struct batch_composite : ray_program_base {
     return s.transmittance >= options.transmittance_min && s.hits != options.max_hits;
   }
   /// Keeps so many that were taken, a lane each.
-  GART_KERNEL GART_INLINE void keep_together(state& s, int count, group_values<taken_hit>& taken) const {
-    if constexpr (Keep::any) keep.keep_together(s.kept, s.number, s.hits - static_cast<u32>(count), count, taken);
+  GART_KERNEL GART_INLINE void keep_together(state& s, u32 count, group_values<taken_hit>& taken) const {
+    if constexpr (Keep::any) keep.keep_together(s.kept, s.number, s.hits - count, count, taken);
   }
 
   /// Writes what the ray saw.
@@ -193,31 +161,5 @@ struct batch_composite : ray_program_base {
   }
 };
 static_assert(ray_program<batch_composite<>>);
-
-/// The ray program of hit lists: the same hits as those that are composited.
-struct batch_list : ray_program_base {
-  using ray_type = ray;  ///< from anywhere
-  /// A ray on its way.
-  struct state : hit_writer::state {
-    float far;  ///< where it ends
-  };
-
-  batch_rays rays;  ///< of the batch
-  hit_writer to;    ///< where hits go
-
-  /// Every ray is one.
-  GART_HD bool active(index_t) const { return true; }
-  /// Where ray i ends.
-  GART_HD float far(index_t i) const { return rays.far(i); }
-  /// The state before the first hit.
-  GART_HD state begin(index_t i) const { return {to.begin(i, rays.of(i)), rays.far(i)}; }
-  /// Ray i, in the batch's frame.
-  GART_HD ray ray_of(index_t, state const& s) const { return s.own; }
-  /// Takes a hit. False: the ray ends.
-  GART_HD GART_INLINE bool on_hit(state& s, hit const& h) const { return h.t <= s.far && to.on_hit(s, h); }
-  /// Takes the ray.
-  GART_HD void end(index_t, state const& s) const { to.end(s); }
-};
-static_assert(ray_program<batch_list>);
 
 }}  // namespace gart::GART_ISA

@@ -22,53 +22,42 @@ template <execution E>
 struct kept_batch {
   /// None yet.
   explicit kept_batch(E& exec)
-      : ids(exec),
-        run_rays(exec),
-        run_firsts(exec),
-        counts(exec),
-        entries(exec),
-        depths(exec),
-        offsets(exec),
-        used(exec),
-        sorted_ids(exec),
-        places(exec) {}
+      : runs(exec), ids(exec), entries(exec), depths(exec), offsets(exec), sorted_ids(exec), places(exec) {}
 
-  buffer<u32, E> ids, run_rays, run_firsts, counts;  ///< as keep_hits has them
-  buffer<hit_entry, E> entries;                      ///< the same
-  buffer<float, E> depths;                           ///< the same
-  buffer<u64, E> offsets;                            ///< [R]: the hits of the rays before
-  buffer<u64, E> used;                               ///< [2]: places that rays took; hits
-  buffer<u32, E> sorted_ids, places;                 ///< by Gaussian, then by ray
-  u64 taken = 0;                                     ///< places, with those that hold no hit
-  u64 count = 0;                                     ///< hits
-  bool sorted = false;                               ///< the order by Gaussian is there
+  hit_runs<E> runs;                   ///< whose the places are
+  buffer<u32, E> ids;                 ///< as keep_hits has them
+  buffer<hit_entry, E> entries;       ///< the same
+  buffer<float, E> depths;            ///< the same
+  buffer<u64, E> offsets;             ///< [R]: the hits of the rays before
+  buffer<u32, E> sorted_ids, places;  ///< by Gaussian, then by ray
+  u64 taken = 0;                      ///< places, with those that hold no hit
+  u64 count = 0;                      ///< hits
+  bool sorted = false;                ///< the order by Gaussian is there
 };
 
 namespace ray_kernels {
 
 inline constexpr u32 piece_hits = 32;
 
-// The hits in the order of the rays, and in theirs.
-template <execution E>
+// The hits in the order of the rays.
 struct order_by_ray {
-  u32 const *ids, *run_rays, *run_firsts, *counts;
-  u64 const* offsets;
+  run_reader runs;
+  u32 const* ids;
   u32 *to_ids, *to_places;
   GART_KERNEL void operator()(index_t place) const {
-    constexpr u32 run = keep_hits<E>::run;
-    u32 const ray_number = run_rays[place / run], k = run_firsts[place / run] + place % run;
-    if (k >= counts[ray_number]) return;
-    u64 const to = offsets[ray_number] + k;
-    to_ids[to] = ids[place], to_places[to] = place;
+    u32 ray_number;
+    u64 to;
+    if (runs.find(place, ray_number, to)) to_ids[to] = ids[place], to_places[to] = place;
   }
 };
 
 // Rows are laid out as pair_gradient has them, so that sum_pairs adds them up.
-template <class Response, execution E>
+template <class Response>
 struct sum_piece {
   static constexpr int block_size = 64, min_blocks = 8;
   static constexpr int bands = sh_basis<color_rows::most>::size;
-  u32 const *ids, *places, *run_rays;
+  run_reader runs;
+  u32 const *ids, *places;
   hit_entry const* entries;
   float const* depths;
   u32 const *firsts, *ends;
@@ -103,7 +92,7 @@ struct sum_piece {
                                float (&moment)[moment_stride]) const {
     u32 const place = places[k];
     hit_entry const entry = entries[place];
-    differentiated_ray const from = rays[run_rays[place / keep_hits<E>::run]];
+    differentiated_ray const from = rays[runs.ray_of(place)];
     vec3 const g = from.by_color, opaque = entry.color();
     float const w = entry.weight();
     vec3 const c(entry.clamped(0) ? 0.0f : w * g.x, entry.clamped(1) ? 0.0f : w * g.y,
@@ -145,10 +134,10 @@ class batch_gather {
     int const sh_floats = gradients.sh_stride();
     rows_.resize(u64{pieces} * static_cast<u64>((sh_floats + 3) / 4 + moment_stride / 4));
     parallel_for(exec, "rays/gather", pieces,
-                 ray_kernels::sum_piece<Response, E>{hits.sorted_ids.data(), hits.places.data(), hits.run_rays.data(),
-                                                     hits.entries.data(), hits.depths.data(), pieces_.firsts(),
-                                                     pieces_.ends(), rays.data(), records.data(), sh_floats,
-                                                     3 * sh_coefficients(active_degree), rows_.data()});
+                 ray_kernels::sum_piece<Response>{hits.runs.read(hits.offsets.data()), hits.sorted_ids.data(),
+                                                  hits.places.data(), hits.entries.data(), hits.depths.data(),
+                                                  pieces_.firsts(), pieces_.ends(), rays.data(), records.data(),
+                                                  sh_floats, 3 * sh_coefficients(active_degree), rows_.data()});
     switch (gradients.sh_degree) {
       case 0:
         return add_up<0>(exec, pieces, gradients, moments);
@@ -165,10 +154,9 @@ class batch_gather {
   static void sort(E& exec, kept_batch<E>& hits, index_t n, index_t gaussians) {
     if (hits.sorted) return;
     hits.sorted_ids.resize(n), hits.places.resize(n);
-    parallel_for(
-        exec, "rays/places", static_cast<index_t>(hits.taken),
-        ray_kernels::order_by_ray<E>{hits.ids.data(), hits.run_rays.data(), hits.run_firsts.data(), hits.counts.data(),
-                                     hits.offsets.data(), hits.sorted_ids.data(), hits.places.data()});
+    parallel_for(exec, "rays/places", static_cast<index_t>(hits.taken),
+                 ray_kernels::order_by_ray{hits.runs.read(hits.offsets.data()), hits.ids.data(), hits.sorted_ids.data(),
+                                           hits.places.data()});
     sort_pairs(exec, hits.sorted_ids.view(), hits.places.view(), static_cast<int>(std::bit_width(gaussians - 1)));
     hits.sorted = true;
   }

@@ -16,13 +16,15 @@ namespace gart { inline namespace GART_ISA { namespace trace_kernels {
 
 static_assert(bvh_width == group_lanes);
 
-// A program may take hits in three steps: lanes look up what several of them show, all lanes alike take them in turn,
-// and lanes keep what is left of each. P::taken_hit is what that is.
+// A program may take hits in three steps: lanes look up what several of them show, where it wants to know; all lanes
+// alike take them in turn; and lanes keep what is left of each, a P::taken_hit.
 template <class P>
-concept takes_together = requires(P const& p, typename P::state& s, hit h, typename P::taken_hit& taken,
-                                  group_values<typename P::taken_hit>& all) {
-  { p.take(s, h, p.shade(s, h.id), taken) } -> std::same_as<bool>;  // false ends the ray
-  p.keep_together(s, 1, all);
+concept shows_hits = requires(P const& p, typename P::state& s, hit h) {
+  p.shade(s, h.id);
+};
+template <class P>
+concept takes_together = requires(P const& p, typename P::state& s, group_values<typename P::taken_hit>& all) {
+  p.keep_together(s, u32{1}, all);
 };
 
 // What the lanes of a ray share. Groups of a warp begin eight banks apart.
@@ -201,7 +203,7 @@ class grouped_ray {
       if (l >= count) return;
       hit const h = hits_.at(first + l);
       m_.ready.put(l, h);
-      if constexpr (takes_together<P>) m_.shown[l] = program_.shade(state_, h.id);
+      if constexpr (takes_together<P> && shows_hits<P>) m_.shown[l] = program_.shade(state_, h.id);
     });
     group_barrier();
     bool goes_on = true;
@@ -210,10 +212,13 @@ class grouped_ray {
       int taken = 0;
       while (goes_on && taken < count) {
         typename P::taken_hit one;
-        goes_on = program_.take(state_, m_.ready.at(taken), m_.shown[taken], one);
+        if constexpr (shows_hits<P>)
+          goes_on = program_.take(state_, m_.ready.at(taken), m_.shown[taken], one);
+        else
+          goes_on = program_.take(state_, m_.ready.at(taken), one);
         give_lane(all, taken++, one);
       }
-      program_.keep_together(state_, taken, all);
+      program_.keep_together(state_, static_cast<u32>(taken), all);
     } else {
       group_values<bool> more;
       each_in_group([&](int l) {
