@@ -5,7 +5,7 @@
 /// a candidate, or looks up what a hit shows. Nodes are visited once, nearest first. Hits wait until they lie before
 /// all that is left.
 ///
-/// Memory a ray: 96 nodes, 64 hits. The farthest of either are dropped where there is no room. Hits before them are
+/// Memory a ray: 80 nodes, 48 hits. The farthest of either are dropped where there is no room. Hits before them are
 /// still passed on, and the ray walks again, strictly after its last. Where that brings no hit, one lane goes on as
 /// walk_alone does.
 
@@ -29,13 +29,13 @@ concept takes_together = requires(P const& p, typename P::state& s, group_values
 
 // What the lanes of a ray share. Groups of a warp begin eight banks apart.
 struct group_memory {
-  static constexpr int node_room = 96, hit_room = 64;
+  static constexpr int node_room = 80, hit_room = 48;
   u32 key[node_room], node[node_room];  // bits of the distance of entry
   u32 candidate[2 * group_lanes];
   group_hits_memory<hit_room> hits;
   lane_hits<group_lanes, 1> ready;  // to be passed on, in order
   vec3 shown[group_lanes];          // by those
-  u32 apart[24];
+  u32 apart[12];
 };
 static_assert(sizeof(group_memory) % 128 == 32);
 
