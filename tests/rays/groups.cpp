@@ -51,31 +51,47 @@ struct kept_by_walk {
   std::vector<gart::u32> ids, found_ids;
   std::vector<float> depths, weights, found_t;
 };
+// Traces programs by one of the walks.
 template <class E>
-kept_by_walk kept_by(bool groups, E& exec, gart::gaussians<E> const& scene, gart::ray_tracer<E> const& tracer,
-                     gart::ray_batch const& rays, gart::render_options const& options) {
-  gart::gaussians_view<float const> const view = scene.view();
-  gart::buffer<gart::ray_gaussian, E> records(exec, view.count);
-  gart::parallel_for(
-      exec, "records", view.count,
-      gart::render_kernels::prepare_gaussians<response>{view, rays.frame, options.alpha_min, records.view()});
-  gart::traced_scene const traced{records.data(), view.count, options.near};
-  gart::index_t const n = rays.count();
-  auto const walk = [&](auto const& program) {
+struct walker {
+  E& exec;
+  gart::ray_tracer<E> const& tracer;
+  gart::ray_batch rays;
+  gart::traced_scene traced;
+  gart::buffer<gart::ray_gaussian, E> records;
+
+  walker(E& on, gart::gaussians<E> const& scene, gart::ray_tracer<E> const& by, gart::ray_batch const& batch,
+         gart::render_options const& options)
+      : exec(on), tracer(by), rays(batch), records(on, scene.size()) {
+    traced = {records.data(), static_cast<gart::index_t>(scene.size()), options.near};
+    gart::parallel_for(
+        exec, "records", traced.count,
+        gart::render_kernels::prepare_gaussians<response>{scene.view(), rays.frame, options.alpha_min, records.view()});
+  }
+  void walk(bool groups, auto const& program) const {
     gart::world_view const index = tracer.index().seen_from(rays.frame);
+    gart::index_t const n = rays.count();
     if (groups)
       gart::trace_kernels::trace_groups<response>(exec, "walk", index, traced, n, nullptr, nullptr, program);
     else
       gart::trace_kernels::trace_alone<response>(exec, "walk", index, traced, n, nullptr, nullptr, program);
-  };
+  }
+};
+
+template <class E>
+kept_by_walk kept_by(bool groups, E& exec, gart::gaussians<E> const& scene, gart::ray_tracer<E> const& tracer,
+                     gart::ray_batch const& rays, gart::render_options const& options) {
+  gart::gaussians_view<float const> const view = scene.view();
+  walker<E> const by(exec, scene, tracer, rays, options);
+  gart::index_t const n = rays.count();
   constexpr std::size_t room = 1u << 19;
   gart::hit_runs<E> runs(exec);
   gart::buffer<gart::u32, E> ids(exec, room);
   gart::buffer<gart::hit_entry, E> entries(exec, room);
   gart::buffer<float, E> depths(exec, room);
   gart::keep_hits<E> const keep{runs.begin(n, room), ids.data(), entries.data(), depths.data()};
-  walk(gart::batch_composite<gart::keep_hits<E>>{
-      {}, gart::batch_rays(rays), {view.sh, view.sh_degree, view.sh_degree}, options, {}, keep});
+  by.walk(groups, gart::batch_composite<gart::keep_hits<E>>{
+                      {}, gart::batch_rays(rays), {view.sh, view.sh_degree, view.sh_degree}, options, {}, keep});
   kept_by_walk out{in_order(runs, ids), {}, in_order(runs, depths), {}, {}};
   for (gart::hit_entry const& entry : in_order(runs, entries)) out.weights.push_back(entry.w);
 
@@ -84,7 +100,7 @@ kept_by_walk kept_by(bool groups, E& exec, gart::gaussians<E> const& scene, gart
   gart::run_writer<E> const writer = runs.begin(n, room);
   gart::hit_writer counting{options.transmittance_min, options.max_hits};
   counting.counts = writer.counts;
-  walk(find{{}, {{}, gart::batch_rays(rays), counting}, writer, found.data()});
+  by.walk(groups, find{{}, {{}, gart::batch_rays(rays), counting}, writer, found.data()});
   for (auto const& hit : in_order(runs, found)) out.found_ids.push_back(hit.id), out.found_t.push_back(hit.t);
   return out;
 }
@@ -164,4 +180,19 @@ TEST_CASE_TEMPLATE("lists are the same where one walk makes them, and where ther
   CHECK(equal(few, list(fresh, two_hits)));
   CHECK(equal(list(tracer, {}), in_two_walks));  // too little
   CHECK(equal(list(tracer, {}), in_two_walks));
+
+  // With what is differentiated.
+  walker<E> const by(exec, scene, tracer, batch.rays(), {});
+  gart::batch_lists<E> lists(exec);
+  gart::hit_table<E> tables[2] = {gart::hit_table<E>(exec), gart::hit_table<E>(exec)};
+  for (gart::hit_table<E>& table : tables)
+    lists(exec, table, batch.rays(), {}, true, [&](char const*, auto const& program) { by.walk(true, program); });
+  CHECK(equal(tables[1].to_host(), in_two_walks));
+  CHECK(tables[0].rays.to_host() == tables[1].rays.to_host());
+  auto const lines = tables[0].lines.to_host(), again = tables[1].lines.to_host();
+  CHECK(lines.size() == 999);
+  for (std::size_t i = 0; i < lines.size(); i += 99) {
+    CHECK(lines[i].origin == again[i].origin);
+    CHECK(lines[i].direction == again[i].direction);
+  }
 }
