@@ -7,6 +7,9 @@
 #include <gart/rays/lidar.hpp>
 #include <gart/rays/ray_tracer.hpp>
 
+#include <map>
+#include <string>
+
 namespace {
 
 using gart::gradient_form;
@@ -169,6 +172,35 @@ void both(benchmark::State& state, E& exec) {
   });
 }
 
+template <gart::ray_list (*Rays)(), gradient_form Form, gart::execution E>
+void forward(benchmark::State& state, E& exec) {
+  batch<E> b(exec, Rays());
+  gart_bench::measure(state, exec, [&] { b.forward(Form); });
+}
+
+// Both passes; every stage of them is a counter, in milliseconds. The clocks between stages cost a little themselves.
+template <gart::ray_list (*Rays)(), gradient_form Form, gart::execution E>
+void stages(benchmark::State& state, E& exec) {
+  batch<E> b(exec, Rays());
+  auto const both = [&] {
+    gart::stage_scope<E> scope(exec, "all");
+    auto context = b.forward(Form);
+    b.backward(context);
+  };
+  both();
+  std::map<std::string, double> sums;
+  for (auto _ : state) {
+    exec.profile.clear(), exec.profile.enable(true);
+    both();
+    exec.synchronize();
+    exec.profile.enable(false);
+    for (auto const& [label, stage] : exec.profile.stages()) sums[label] += stage.milliseconds;
+    state.SetIterationTime(1e-3 * exec.profile.stages().at("all").milliseconds);
+  }
+  for (auto const& [label, sum] : sums)
+    state.counters[label] = benchmark::Counter(sum, benchmark::Counter::kAvgIterations);
+}
+
 }  // namespace
 
 GART_BENCH("rays/view/tiles", image<gart_bench::by_tiles<8>>)
@@ -180,10 +212,12 @@ GART_BENCH("rays/lidar/trace", trace<lidar>)
 GART_BENCH("rays/lidar/alone", [](auto& state, auto& exec) { walks<lidar>(state, exec, 0, 0); })
 GART_BENCH("rays/lidar/groups", [](auto& state, auto& exec) { walks<lidar>(state, exec, 0, 0, true, true); })
 GART_BENCH("rays/lidar/list", list<lidar>)
+GART_BENCH("rays/lidar/forward/primitive", forward<lidar, gradient_form::primitive>)
 GART_BENCH("rays/lidar/backward/primitive", backward<lidar, gradient_form::primitive>)
 GART_BENCH("rays/lidar/backward/scatter", backward<lidar, gradient_form::scatter>)
 GART_BENCH("rays/lidar/both/primitive", both<lidar, gradient_form::primitive>)
 GART_BENCH("rays/lidar/both/scatter", both<lidar, gradient_form::scatter>)
+GART_BENCH("rays/lidar/stages/primitive", stages<lidar, gradient_form::primitive>)
 GART_BENCH("rays/incoherent/trace", trace<incoherent>)
 GART_BENCH("rays/incoherent/alone", [](auto& state, auto& exec) { walks<incoherent>(state, exec, 0, 0); })
 GART_BENCH("rays/incoherent/groups", [](auto& state, auto& exec) { walks<incoherent>(state, exec, 0, 0, true, true); })

@@ -28,6 +28,83 @@ gart::traced_rays by_groups(E& exec, gart::gaussians<E> const& scene, gart::ray_
   return out.to_host();
 }
 
+// What rays kept of their hits by place, in the order of the rays. Each hit is there once.
+template <class T, class E>
+std::vector<T> in_order(gart::hit_runs<E> const& runs, gart::buffer<T, E> const& by_place) {
+  auto const rays = runs.rays.to_host(), firsts = runs.firsts.to_host(), counts = runs.counts.to_host();
+  auto const places = by_place.to_host();
+  std::vector<std::size_t> offsets(1);
+  for (gart::u32 const count : counts) offsets.push_back(offsets.back() + count);
+  std::vector<T> out(offsets.back());
+  std::vector<int> there(out.size());
+  for (std::size_t place = 0; place < runs.used.front(); ++place) {
+    std::size_t const ray = rays.at(place / gart::hit_run), k = firsts[place / gart::hit_run] + place % gart::hit_run;
+    if (k >= counts.at(ray)) continue;
+    ++there[offsets[ray] + k], out[offsets[ray] + k] = places[place];
+  }
+  CHECK(std::count(there.begin(), there.end(), 1) == static_cast<std::ptrdiff_t>(there.size()));
+  return out;
+}
+
+// What a batch keeps for its gradient, and what it finds for a list, by one of the walks.
+struct kept_by_walk {
+  std::vector<gart::u32> ids, found_ids;
+  std::vector<float> depths, weights, found_t;
+};
+// Traces programs by one of the walks.
+template <class E>
+struct walker {
+  E& exec;
+  gart::ray_tracer<E> const& tracer;
+  gart::ray_batch rays;
+  gart::traced_scene traced;
+  gart::buffer<gart::ray_gaussian, E> records;
+
+  walker(E& on, gart::gaussians<E> const& scene, gart::ray_tracer<E> const& by, gart::ray_batch const& batch,
+         gart::render_options const& options)
+      : exec(on), tracer(by), rays(batch), records(on, scene.size()) {
+    traced = {records.data(), static_cast<gart::index_t>(scene.size()), options.near};
+    gart::parallel_for(
+        exec, "records", traced.count,
+        gart::render_kernels::prepare_gaussians<response>{scene.view(), rays.frame, options.alpha_min, records.view()});
+  }
+  void walk(bool groups, auto const& program) const {
+    gart::world_view const index = tracer.index().seen_from(rays.frame);
+    gart::index_t const n = rays.count();
+    if (groups)
+      gart::trace_kernels::trace_groups<response>(exec, "walk", index, traced, n, nullptr, nullptr, program);
+    else
+      gart::trace_kernels::trace_alone<response>(exec, "walk", index, traced, n, nullptr, nullptr, program);
+  }
+};
+
+template <class E>
+kept_by_walk kept_by(bool groups, E& exec, gart::gaussians<E> const& scene, gart::ray_tracer<E> const& tracer,
+                     gart::ray_batch const& rays, gart::render_options const& options) {
+  gart::gaussians_view<float const> const view = scene.view();
+  walker<E> const by(exec, scene, tracer, rays, options);
+  gart::index_t const n = rays.count();
+  constexpr std::size_t room = 1u << 19;
+  gart::hit_runs<E> runs(exec);
+  gart::buffer<gart::u32, E> ids(exec, room);
+  gart::buffer<gart::hit_entry, E> entries(exec, room);
+  gart::buffer<float, E> depths(exec, room);
+  gart::keep_hits<E> const keep{runs.begin(n, room), ids.data(), entries.data(), depths.data()};
+  by.walk(groups, gart::batch_composite<gart::keep_hits<E>>{
+                      {}, gart::batch_rays(rays), {view.sh, view.sh_degree, view.sh_degree}, options, {}, keep});
+  kept_by_walk out{in_order(runs, ids), {}, in_order(runs, depths), {}, {}};
+  for (gart::hit_entry const& entry : in_order(runs, entries)) out.weights.push_back(entry.w);
+
+  using find = gart::batch_find<E>;
+  gart::buffer<typename find::taken_hit, E> found(exec, room);
+  gart::run_writer<E> const writer = runs.begin(n, room);
+  gart::hit_writer counting{options.transmittance_min, options.max_hits};
+  counting.counts = writer.counts;
+  by.walk(groups, find{{}, {{}, gart::batch_rays(rays), counting}, writer, found.data()});
+  for (auto const& hit : in_order(runs, found)) out.found_ids.push_back(hit.id), out.found_t.push_back(hit.t);
+  return out;
+}
+
 }  // namespace
 
 TEST_CASE_TEMPLATE("eight lanes a ray see the same as one", E, GART_TEST_POLICIES) {
@@ -52,6 +129,15 @@ TEST_CASE_TEMPLATE("eight lanes a ray see the same as one", E, GART_TEST_POLICIE
       auto const wanted = trace_all(exec, tracer, batch.rays(), options);
       CHECK(same(by_groups(exec, scene, tracer, batch.rays(), options), wanted));
       CHECK(*std::max_element(wanted.hits.begin(), wanted.hits.end()) > (many ? 200 : 24));
+      kept_by_walk const kept = kept_by(true, exec, scene, tracer, batch.rays(), options);
+      kept_by_walk const alone = kept_by(false, exec, scene, tracer, batch.rays(), options);
+      CHECK(kept.ids == alone.ids);
+      CHECK(kept.depths == alone.depths);
+      CHECK(kept.weights == alone.weights);
+      CHECK(kept.found_ids == kept.ids);
+      CHECK(alone.found_ids == kept.ids);
+      CHECK(kept.found_t == alone.found_t);
+      CHECK(kept.ids.size() > 2000);
     }
   }
 }
@@ -69,4 +155,44 @@ TEST_CASE_TEMPLATE("eight lanes a ray meet boxes that all overlap", E, GART_TEST
   auto const wanted = trace_all(exec, tracer, batch.rays(), {});
   CHECK(same(by_groups(exec, scene, tracer, batch.rays(), {}), wanted));
   CHECK(*std::max_element(wanted.hits.begin(), wanted.hits.end()) > 500);
+}
+
+TEST_CASE_TEMPLATE("lists are the same where one walk makes them, and where there is too little room for that", E,
+                   GART_TEST_POLICIES) {
+  E exec;
+  gart::gaussians<E> const scene(exec, cloud(5, 2, 2000));
+  random_rays const rays(11, 999, 2.0f);
+  batch_memory<E> const batch(exec, {}, rays.origins, rays.directions);
+  gart::render_options two_hits;
+  two_hits.max_hits = 2;
+  auto const list = [&](gart::ray_tracer<E>& tracer, gart::render_options const& options) {
+    return tracer.list(batch.rays(), options).to_host();
+  };
+  auto const equal = [](gart::hit_lists const& a, gart::hit_lists const& b) {
+    return a.offsets == b.offsets && a.ids == b.ids && a.t == b.t && a.alpha == b.alpha && a.weight == b.weight;
+  };
+  gart::ray_tracer<E> tracer(exec), fresh(exec);
+  tracer.set_scene(scene.view(), 2), fresh.set_scene(scene.view(), 2);
+  gart::hit_lists const in_two_walks = list(tracer, {});
+  CHECK(in_two_walks.ids.size() > 10 * 999);
+  CHECK(equal(list(tracer, {}), in_two_walks));  // there is room now
+  gart::hit_lists const few = list(tracer, two_hits);
+  CHECK(equal(few, list(fresh, two_hits)));
+  CHECK(equal(list(tracer, {}), in_two_walks));  // too little
+  CHECK(equal(list(tracer, {}), in_two_walks));
+
+  // With what is differentiated.
+  walker<E> const by(exec, scene, tracer, batch.rays(), {});
+  gart::batch_lists<E> lists(exec);
+  gart::hit_table<E> tables[2] = {gart::hit_table<E>(exec), gart::hit_table<E>(exec)};
+  for (gart::hit_table<E>& table : tables)
+    lists(exec, table, batch.rays(), {}, true, [&](char const*, auto const& program) { by.walk(true, program); });
+  CHECK(equal(tables[1].to_host(), in_two_walks));
+  CHECK(tables[0].rays.to_host() == tables[1].rays.to_host());
+  auto const lines = tables[0].lines.to_host(), again = tables[1].lines.to_host();
+  CHECK(lines.size() == 999);
+  for (std::size_t i = 0; i < lines.size(); i += 99) {
+    CHECK(lines[i].origin == again[i].origin);
+    CHECK(lines[i].direction == again[i].direction);
+  }
 }

@@ -106,13 +106,19 @@ class hit_table {
   void list(E& exec, index_t of_rays, float transmittance_min, u32 max_hits, bool differentiable, F&& trace,
             span<u32 const> counts = {}) {
     hit_writer to{transmittance_min, max_hits};
-    ordered_ = false;
-    offsets.resize(std::size_t{of_rays} + 1);
     if (counts.size() == 0) {
       counts_.resize(of_rays), counts_.zero();
       to.counts = counts_.data(), counts = counts_;
       trace("hits/count", to);
     }
+    to = lay_out(exec, of_rays, differentiable, counts);
+    to.transmittance_min = transmittance_min, to.max_hits = max_hits;
+    if (ids.size() > 0) trace("hits/list", to);
+  }
+  /// Room for as many hits of each ray, where they are to be written. The lines stay, where they have their size.
+  hit_writer lay_out(E& exec, index_t of_rays, bool differentiable, span<u32 const> counts) {
+    ordered_ = false;
+    offsets.resize(std::size_t{of_rays} + 1);
     span<u64> const at = offsets.view();
     exclusive_scan(exec, counts, at.subspan(0, of_rays), at.subspan(of_rays, 1));
     u64 total = 0;
@@ -122,11 +128,11 @@ class hit_table {
                           "more than 2^32 hits at a time: trace fewer rays, or rows of the view");
     for (buffer<float, E>* const each : {&t, &alpha, &weight}) each->resize(total);
     ids.resize(total), rays.resize(differentiable ? total : 0), lines.resize(differentiable ? of_rays : 0);
-    if (total == 0) return;
+    hit_writer to;
     to.offsets = offsets.data(), to.ids = ids.data(), to.t = t.data(), to.alpha = alpha.data();
     to.weight = weight.data();
     if (differentiable) to.rays = rays.data(), to.lines = lines.data();
-    trace("hits/list", to);
+    return to;
   }
 
   /// For kernels.

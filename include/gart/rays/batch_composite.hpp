@@ -9,6 +9,7 @@
 #include <gart/math/blend.hpp>
 #include <gart/math/sh.hpp>
 #include <gart/rays/batch_rays.hpp>
+#include <gart/rays/hit_runs.hpp>
 #include <gart/render/composite.hpp>
 
 namespace gart { inline namespace GART_ISA {
@@ -34,49 +35,49 @@ struct color_rows {
 /// Keeps no hits.
 struct keep_none {
   static constexpr bool any = false;  ///< none is kept
+  struct hit {};                      ///< nothing of one
   struct state {};                    ///< nothing
 };
 
-/// Keeps what the gradient needs of each hit, in no order, for a sum by Gaussian (rays/batch_gather.hpp). Rays take
-/// places a run at a time; what they leave of their last run is marked. Where there are more hits than places, the rest
-/// is counted, not written.
+/// Keeps what the gradient needs of each hit, for a sum by Gaussian (rays/batch_gather.hpp).
 template <execution E>
 struct keep_hits {
   static constexpr bool any = true;  ///< some are kept
-  static constexpr u32 run = 16;     ///< places that a ray takes at a time
-  /// Of a ray: its next place, and how many it has left.
-  struct state {
-    u64 at = 0;    ///< place
-    u32 left = 0;  ///< places
+  /// What is kept of one.
+  struct hit {
+    hit_entry entry;  ///< of its colour
+    float depth;      ///< that the ray would have if the hit were opaque
+    u32 id;           ///< the Gaussian
   };
-  u64* keys = nullptr;           ///< [capacity]: Gaussian << ray_bits | ray
-  hit_entry* entries = nullptr;  ///< [capacity]
-  float* depths = nullptr;       ///< [capacity]: the depth that the ray would have if the hit were opaque
-  u64* used = nullptr;           ///< places that rays have taken
-  u64 capacity = 0;              ///< a multiple of run
-  int ray_bits = 0;              ///< of a ray's number
-  u64 no_key = 0;                ///< of a place without a hit; past all others
+  using state = typename run_writer<E>::state;  ///< of a ray
+  run_writer<E> runs;                           ///< where they go
+  u32* ids = nullptr;                           ///< [places]: Gaussians
+  hit_entry* entries = nullptr;                 ///< [places]
+  float* depths = nullptr;                      ///< [places]
 
-  /// Keeps a hit of a ray.
-  GART_KERNEL GART_INLINE void keep(state& s, index_t ray_number, u32 id, hit_entry const& entry, float depth) const {
-    if (s.left == 0) s.at = E::atomic_add(used, u64{run}), s.left = run;
-    if (s.at < capacity) {
-      keys[s.at] = u64{id} << ray_bits | ray_number;
-      entries[s.at] = entry, depths[s.at] = depth;
-    }
-    ++s.at, --s.left;
+  /// Keeps a hit of a ray, that of number k.
+  GART_KERNEL GART_INLINE void keep(state& s, index_t ray_number, u32 k, hit const& h) const {
+    runs.put(s, ray_number, k, [&](u64 at) { write(at, h); });
+  }
+  /// Keeps so many hits of a ray from number `first`, a lane each.
+  GART_KERNEL GART_INLINE void keep_together(state& s, index_t ray_number, u32 first, u32 count,
+                                             group_values<hit>& hits) const {
+    runs.put_together(s, ray_number, first, count, [&](int l, u64 at) { write(at, hits[l]); });
   }
   /// After the last one.
-  GART_KERNEL GART_INLINE void end(state& s) const {
-    for (; s.left != 0; --s.left, ++s.at)
-      if (s.at < capacity) keys[s.at] = no_key;
+  GART_KERNEL GART_INLINE void end(index_t ray_number, u32 hits) const { runs.counts[ray_number] = hits; }
+
+ private:
+  GART_KERNEL GART_INLINE void write(u64 at, hit const& h) const {
+    ids[at] = h.id, entries[at] = h.entry, depths[at] = h.depth;
   }
 };
 
 /// The ray program (trace/ray_program.hpp). Keep: keep_none or keep_hits.
 template <class Keep = keep_none>
 struct batch_composite : ray_program_base {
-  using ray_type = ray;  ///< from anywhere
+  using ray_type = ray;                  ///< from anywhere
+  using taken_hit = typename Keep::hit;  ///< what is kept of one
   /// A ray on its way.
   struct state : composited_hits<float> {
     index_t number;                                   ///< of the ray
@@ -114,24 +115,36 @@ struct batch_composite : ray_program_base {
   /// The colour of a Gaussian as the ray sees it, before the clamp.
   GART_HD GART_INLINE vec3 shade(state const& s, u32 id) const { return colors.unclamped(s.basis, id); }
   /// Composites a hit. False: the ray ends.
-  GART_KERNEL GART_INLINE bool on_hit(state& s, hit const& h) const { return on_hit(s, h, shade(s, h.id)); }
-  /// The same, of that colour.
-  GART_KERNEL GART_INLINE bool on_hit(state& s, hit const& h, vec3 const& unclamped) const {
+  GART_KERNEL GART_INLINE bool on_hit(state& s, hit const& h) const {
     if (h.t > s.far) return false;
+    taken_hit taken;
+    bool const goes_on = take(s, h, shade(s, h.id), taken);
+    if constexpr (Keep::any) keep.keep(s.kept, s.number, s.hits - 1, taken);
+    return goes_on;
+  }
+  /// The same of a hit before the ray's end, of that colour; it is not kept yet.
+  GART_HD GART_INLINE bool take(state& s, hit const& h, vec3 const& unclamped, taken_hit& taken) const {
     vec3 const c = clamped_color(unclamped);
     [[maybe_unused]] vec3 const opaque = opaque_color(c, s.color, s.transmittance);
     [[maybe_unused]] float const depth = opaque_depth(h.t, s.depth, s.transmittance);
     float const weight = blend(h.alpha, h.t, c, s.color, s.depth, s.transmittance);
-    if constexpr (Keep::any) keep.keep(s.kept, s.number, h.id, hit_entry::of(opaque, weight, unclamped), depth);
+    if constexpr (Keep::any)
+      taken = {hit_entry::of(opaque, weight, unclamped), depth, h.id};
+    else
+      taken = {};
     if (s.hits++ == 0) s.first = h.t, s.first_id = h.id;
     if (s.median_id == no_gaussian && s.transmittance < 0.5f) s.median = h.t, s.median_id = h.id;
     if (weight > s.top_weight) s.top_weight = weight, s.top_id = h.id;
     return s.transmittance >= options.transmittance_min && s.hits != options.max_hits;
   }
+  /// Keeps so many that were taken, a lane each.
+  GART_KERNEL GART_INLINE void keep_together(state& s, u32 count, group_values<taken_hit>& taken) const {
+    if constexpr (Keep::any) keep.keep_together(s.kept, s.number, s.hits - count, count, taken);
+  }
 
   /// Writes what the ray saw.
   GART_KERNEL GART_INLINE void end(index_t i, state& s) const {
-    if constexpr (Keep::any) keep.end(s.kept);
+    if constexpr (Keep::any) keep.end(i, s.hits);
     if (out.color) {
       vec3 const c = s.color + s.transmittance * options.background;
       float* const to = out.color + std::size_t{3} * i;
@@ -148,31 +161,5 @@ struct batch_composite : ray_program_base {
   }
 };
 static_assert(ray_program<batch_composite<>>);
-
-/// The ray program of hit lists: the same hits as those that are composited.
-struct batch_list : ray_program_base {
-  using ray_type = ray;  ///< from anywhere
-  /// A ray on its way.
-  struct state : hit_writer::state {
-    float far;  ///< where it ends
-  };
-
-  batch_rays rays;  ///< of the batch
-  hit_writer to;    ///< where hits go
-
-  /// Every ray is one.
-  GART_HD bool active(index_t) const { return true; }
-  /// Where ray i ends.
-  GART_HD float far(index_t i) const { return rays.far(i); }
-  /// The state before the first hit.
-  GART_HD state begin(index_t i) const { return {to.begin(i, rays.of(i)), rays.far(i)}; }
-  /// Ray i, in the batch's frame.
-  GART_HD ray ray_of(index_t, state const& s) const { return s.own; }
-  /// Takes a hit. False: the ray ends.
-  GART_HD GART_INLINE bool on_hit(state& s, hit const& h) const { return h.t <= s.far && to.on_hit(s, h); }
-  /// Takes the ray.
-  GART_HD void end(index_t, state const& s) const { to.end(s); }
-};
-static_assert(ray_program<batch_list>);
 
 }}  // namespace gart::GART_ISA

@@ -1,12 +1,12 @@
 #pragma once
 /// \file
-/// The backward pass of a batch by primitive: the hits that the forward pass kept (keep_hits) are sorted by Gaussian
-/// and ray, cut into pieces of one Gaussian each, and summed: a lane takes a piece, then the pieces of a Gaussian are
-/// added up in order. No ray is traced, nothing is atomic, and the order of every sum follows from the hits alone: the
-/// same bits in every run.
+/// The backward pass of a batch by primitive: the hits that the forward pass kept (keep_hits) are put in the order of
+/// the rays, sorted by Gaussian, cut into pieces of one Gaussian each, and summed: a lane takes a piece, then the
+/// pieces of a Gaussian are added up in order. No ray is traced, nothing is atomic, and the order of every sum follows
+/// from the hits alone: the same bits in every run.
 ///
-/// Cost: a sort of 12 bytes a hit by as many bits as Gaussians and rays need, one read of 20 bytes a hit and 48 of its
-/// ray, and 240 bytes a piece of 32 hits at SH degree 3. The host reads how many pieces there are.
+/// Cost: a sort of 8 bytes a hit by as many bits as Gaussians need, one read of 20 bytes a hit and 48 of its ray, and
+/// 240 bytes a piece of 32 hits at SH degree 3. The host reads how many pieces there are.
 
 #include <gart/algorithm/sort_pairs.hpp>
 #include <gart/backward/gather.hpp>
@@ -17,35 +17,38 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// The hits of a batch, as the forward pass kept them or sorted.
+/// The hits of a batch: as the forward pass kept them, by place, and sorted.
 template <execution E>
 struct kept_batch {
   /// None yet.
-  explicit kept_batch(E& exec) : keys(exec), entries(exec), depths(exec), places(exec), used(exec) {}
+  explicit kept_batch(E& exec)
+      : runs(exec), ids(exec), entries(exec), depths(exec), offsets(exec), sorted_ids(exec), places(exec) {}
 
-  buffer<u64, E> keys;           ///< Gaussian << ray_bits | ray
-  buffer<hit_entry, E> entries;  ///< by place
-  buffer<float, E> depths;       ///< by place
-  buffer<u32, E> places;         ///< by sorted position
-  buffer<u64, E> used;           ///< [1]: places that rays took
-  u64 count = 0;                 ///< places, with those that hold no hit
-  int ray_bits = 0;              ///< of a key
-  bool sorted = false;           ///< keys are in order, and places with them
+  hit_runs<E> runs;                   ///< whose the places are
+  buffer<u32, E> ids;                 ///< as keep_hits has them
+  buffer<hit_entry, E> entries;       ///< the same
+  buffer<float, E> depths;            ///< the same
+  buffer<u64, E> offsets;             ///< [R]: the hits of the rays before
+  buffer<u32, E> sorted_ids, places;  ///< by Gaussian, then by ray
+  u64 taken = 0;                      ///< places, with those that hold no hit
+  u64 count = 0;                      ///< hits
+  bool sorted = false;                ///< the order by Gaussian is there
 };
 
 namespace ray_kernels {
 
 inline constexpr u32 piece_hits = 32;
 
-struct number_places {
-  u32* places;
-  GART_KERNEL void operator()(index_t i) const { places[i] = i; }
-};
-
-struct id_of_key {
-  u64 const* keys;
-  int ray_bits;
-  GART_HD u64 operator()(index_t k) const { return keys[k] >> ray_bits; }
+// The hits in the order of the rays.
+struct order_by_ray {
+  run_reader runs;
+  u32 const* ids;
+  u32 *to_ids, *to_places;
+  GART_KERNEL void operator()(index_t place) const {
+    u32 ray_number;
+    u64 to;
+    if (runs.find(place, ray_number, to)) to_ids[to] = ids[place], to_places[to] = place;
+  }
 };
 
 // Rows are laid out as pair_gradient has them, so that sum_pairs adds them up.
@@ -53,19 +56,18 @@ template <class Response>
 struct sum_piece {
   static constexpr int block_size = 64, min_blocks = 8;
   static constexpr int bands = sh_basis<color_rows::most>::size;
-  u64 const* keys;
-  u32 const* places;
+  run_reader runs;
+  u32 const *ids, *places;
   hit_entry const* entries;
   float const* depths;
   u32 const *firsts, *ends;
-  int ray_bits;
   differentiated_ray const* rays;
   ray_gaussian const* records;
   int sh_floats, active_floats;  // of a row of gradients; of those the active bands
   quad* rows;
 
   GART_KERNEL void operator()(index_t piece) const {
-    u32 const first = firsts[piece], id = static_cast<u32>(keys[first] >> ray_bits);
+    u32 const first = firsts[piece], id = ids[first];
     u32 const end = ends[id] - first < piece_hits ? ends[id] : first + piece_hits;
     ray_gaussian const gaussian = records[id];
     float color[3 * bands] = {}, moment[moment_stride] = {};
@@ -90,7 +92,7 @@ struct sum_piece {
                                float (&moment)[moment_stride]) const {
     u32 const place = places[k];
     hit_entry const entry = entries[place];
-    differentiated_ray const from = rays[keys[k] & ((u64{1} << ray_bits) - 1)];
+    differentiated_ray const from = rays[runs.ray_of(place)];
     vec3 const g = from.by_color, opaque = entry.color();
     float const w = entry.weight();
     vec3 const c(entry.clamped(0) ? 0.0f : w * g.x, entry.clamped(1) ? 0.0f : w * g.y,
@@ -126,16 +128,16 @@ class batch_gather {
     index_t const n = static_cast<index_t>(hits.count), gaussians = gradients.count;
     if (gaussians == 0) return;
     sort(exec, hits, n, gaussians);
-    pieces_.cut(exec, "rays/pieces", ray_kernels::id_of_key{hits.keys.data(), hits.ray_bits}, n, gaussians,
+    pieces_.cut(exec, "rays/pieces", channel_kernels::id_of_hit{hits.sorted_ids.data()}, n, gaussians,
                 ray_kernels::piece_hits);
     index_t const pieces = pieces_.count();
     int const sh_floats = gradients.sh_stride();
     rows_.resize(u64{pieces} * static_cast<u64>((sh_floats + 3) / 4 + moment_stride / 4));
-    parallel_for(
-        exec, "rays/gather", pieces,
-        ray_kernels::sum_piece<Response>{hits.keys.data(), hits.places.data(), hits.entries.data(), hits.depths.data(),
-                                         pieces_.firsts(), pieces_.ends(), hits.ray_bits, rays.data(), records.data(),
-                                         sh_floats, 3 * sh_coefficients(active_degree), rows_.data()});
+    parallel_for(exec, "rays/gather", pieces,
+                 ray_kernels::sum_piece<Response>{hits.runs.read(hits.offsets.data()), hits.sorted_ids.data(),
+                                                  hits.places.data(), hits.entries.data(), hits.depths.data(),
+                                                  pieces_.firsts(), pieces_.ends(), rays.data(), records.data(),
+                                                  sh_floats, 3 * sh_coefficients(active_degree), rows_.data()});
     switch (gradients.sh_degree) {
       case 0:
         return add_up<0>(exec, pieces, gradients, moments);
@@ -151,10 +153,11 @@ class batch_gather {
  private:
   static void sort(E& exec, kept_batch<E>& hits, index_t n, index_t gaussians) {
     if (hits.sorted) return;
-    hits.places.resize(n);
-    parallel_for(exec, "rays/places", n, ray_kernels::number_places{hits.places.data()});
-    sort_pairs(exec, hits.keys.view().subspan(0, n), hits.places.view(),
-               hits.ray_bits + static_cast<int>(std::bit_width(gaussians)));
+    hits.sorted_ids.resize(n), hits.places.resize(n);
+    parallel_for(exec, "rays/places", static_cast<index_t>(hits.taken),
+                 ray_kernels::order_by_ray{hits.runs.read(hits.offsets.data()), hits.ids.data(), hits.sorted_ids.data(),
+                                           hits.places.data()});
+    sort_pairs(exec, hits.sorted_ids.view(), hits.places.view(), static_cast<int>(std::bit_width(gaussians - 1)));
     hits.sorted = true;
   }
   template <int Degree>

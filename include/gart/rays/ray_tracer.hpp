@@ -16,7 +16,7 @@
 ///
 /// Features (channels/) are shown and differentiated over hit lists: a second trace, and 16 or 40 bytes a hit.
 ///
-/// Memory beside the tree: 64 bytes a Gaussian, with gradients 48 more; 12 bytes a ray, and 20 that a context holds.
+/// Memory beside the tree: 64 bytes a Gaussian, with gradients 48 more; 12 bytes a ray, and 32 that a context holds.
 /// Hits that are kept by gradient_form::primitive take 32 each, and 16 places at a time a ray. Cost: on the first batch
 /// after a change the tree; on a batch in another frame than the last one launch over the Gaussians; then the trace.
 /// Checks wait for the policy once a batch. Errors: invalid_argument as rays/ray_batch.hpp has it, for options that
@@ -26,6 +26,7 @@
 #include <gart/backward/finish.hpp>
 #include <gart/channels/passes.hpp>
 #include <gart/rays/batch_gather.hpp>
+#include <gart/rays/batch_lists.hpp>
 #include <gart/rays/shared_index.hpp>
 #include <gart/render/frame.hpp>
 
@@ -69,7 +70,8 @@ class ray_tracer {
         gather_(exec),
         counts_(exec),
         listed_(exec),
-        channels_backward_(exec) {}
+        channels_backward_(exec),
+        lists_(exec) {}
 
   /// The Gaussians, of any SH degree, whose arrays must stay; bands above active_degree are not evaluated. Where they
   /// are the same as before, what was made of them is kept.
@@ -252,12 +254,9 @@ class ray_tracer {
   // `counts`: of hits, where they are known.
   void list(hit_table<E>& to, ray_batch const& rays, render_options const& options, bool differentiable,
             span<u32 const> counts = {}) {
-    to.list(
-        *exec_, rays.count(), options.transmittance_min, options.max_hits, differentiable,
-        [&](char const* label, hit_writer const& writer) {
-          launch(label, rays, batch_list{{}, batch_rays(rays), writer}, options.near);
-        },
-        counts);
+    lists_(
+        *exec_, to, rays, options, differentiable,
+        [&](char const* label, auto const& program) { launch(label, rays, program, options.near); }, counts);
   }
   // Adds to the moments and to the gradients of rays.
   void differentiate_channels(batch_context<E>& context, output_gradients const& by, bool of_gaussians,
@@ -282,25 +281,26 @@ class ray_tracer {
   void keep(batch_context<E>& context, batch_targets const& out) {
     kept_batch<E>& kept = context.kept;
     index_t const n = context.rays.count();
-    constexpr u64 run = keep_hits<E>::run;
-    kept.ray_bits = std::max(1, static_cast<int>(std::bit_width(n - (n > 0))));
-    kept.used.resize(1);
-    u64 room = std::max<u64>(static_cast<u64>(per_ray_ * n * 1.125) / run * run + run, run);
+    kept.offsets.resize(n);
+    u64 room = hit_runs<E>::room_for(n, per_ray_);
     for (;;) {
-      kept.keys.resize(room), kept.entries.resize(room), kept.depths.resize(room);
-      kept.used.zero();
+      kept.ids.resize(room), kept.entries.resize(room), kept.depths.resize(room);
       launch("rays/forward", context.rays,
-             composite_of<keep_hits<E>>(context.rays, context.options, out,
-                                        {kept.keys.data(), kept.entries.data(), kept.depths.data(), kept.used.data(),
-                                         room, kept.ray_bits, u64{scene_.count} << kept.ray_bits}));
-      kept.count = kept.used.front();
-      if (kept.count >= 0xffffffffu)
-        throw out_of_memory("hit", kept.count * 32, 0,
+             composite_of<keep_hits<E>>(
+                 context.rays, context.options, out,
+                 {kept.runs.begin(n, room), kept.ids.data(), kept.entries.data(), kept.depths.data()}));
+      exclusive_scan(*exec_, span<u32 const>(kept.runs.counts), kept.offsets.view(),
+                     kept.runs.used.view().subspan(1, 1));
+      u64 used[2];
+      exec_->copy_out(used, kept.runs.used.data(), sizeof used);
+      kept.taken = used[0], kept.count = used[1];
+      if (kept.taken >= 0xffffffffu)
+        throw out_of_memory("hit", kept.taken * 32, 0,
                             "more than 2^32 hits of a batch: trace fewer rays at a time, or by gradient_form::scatter");
-      if (kept.count <= room) break;
-      room = kept.count;
+      if (kept.taken <= room) break;
+      room = kept.taken;
     }
-    if (n > 0) per_ray_ = static_cast<double>(kept.count) / n;
+    if (n > 0) per_ray_ = static_cast<double>(kept.taken) / n;
   }
 
   E* exec_;
@@ -326,7 +326,8 @@ class ray_tracer {
   buffer<u32, E> counts_;
   hit_table<E> listed_;
   channel_gradient<E, Response> channels_backward_;
-  double per_ray_ = 0;  // hits that the last batch kept
+  batch_lists<E> lists_;
+  double per_ray_ = 0;  // places that the last batch took to keep hits
 };
 
 }}  // namespace gart::GART_ISA

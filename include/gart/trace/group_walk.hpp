@@ -1,35 +1,41 @@
 #pragma once
 /// \file
-/// The walk of a tree by single rays that are few: eight lanes a ray (trace/lane_group.hpp), four rays a warp. One lane
-/// a ray would leave a device waiting for the longest of them. A lane tests a child, evaluates a candidate, or looks up
-/// what a hit shows. Nodes are visited once, nearest first. Hits wait until they lie before all that is left.
+/// The walk of a tree by single rays that are few: eight lanes a ray (trace/lane_group.hpp), four rays a warp, step by
+/// step together. One lane a ray would leave a device waiting for the longest of them. A lane tests a child, evaluates
+/// a candidate, or looks up what a hit shows. Nodes are visited once, nearest first. Hits wait until they lie before
+/// all that is left.
 ///
-/// Memory a ray: 96 nodes, 64 hits. The farthest of either are dropped where there is no room. Hits before them are
+/// Memory a ray: 80 nodes, 48 hits. The farthest of either are dropped where there is no room. Hits before them are
 /// still passed on, and the ray walks again, strictly after its last. Where that brings no hit, one lane goes on as
 /// walk_alone does.
 
 #include <gart/trace/beam_walk.hpp>
-#include <gart/trace/lane_group.hpp>
+#include <gart/trace/group_hits.hpp>
 
 namespace gart { inline namespace GART_ISA { namespace trace_kernels {
 
 static_assert(bvh_width == group_lanes);
 
-// A program may take a hit in two steps, of which lanes do the first for several hits at a time.
+// A program may take hits in three steps: lanes look up what several of them show, where it wants to know; all lanes
+// alike take them in turn; and lanes keep what is left of each, a P::taken_hit.
 template <class P>
-concept shades_apart = requires(P const& p, typename P::state& s, hit h) {
-  p.on_hit(s, h, p.shade(s, h.id));
+concept shows_hits = requires(P const& p, typename P::state& s, hit h) {
+  p.shade(s, h.id);
+};
+template <class P>
+concept takes_together = requires(P const& p, typename P::state& s, group_values<typename P::taken_hit>& all) {
+  p.keep_together(s, u32{1}, all);
 };
 
 // What the lanes of a ray share. Groups of a warp begin eight banks apart.
 struct group_memory {
-  static constexpr int node_room = 96, hit_room = 64;
+  static constexpr int node_room = 80, hit_room = 48;
   u32 key[node_room], node[node_room];  // bits of the distance of entry
   u32 candidate[2 * group_lanes];
-  lane_hits<hit_room, 1> hits;      // waiting, in no order
+  group_hits_memory<hit_room> hits;
   lane_hits<group_lanes, 1> ready;  // to be passed on, in order
   vec3 shown[group_lanes];          // by those
-  u32 apart[8];
+  u32 apart[12];
 };
 static_assert(sizeof(group_memory) % 128 == 32);
 
@@ -37,12 +43,12 @@ template <class Response, class Index, ray_program P>
 class grouped_ray {
   using state_type = typename P::state;
   using ray_type = typename P::ray_type;
-  static constexpr u32 gone = ~u32{0};
-  static constexpr u64 nothing = ~u64{0};
+  using hits_type = group_hits<group_memory::hit_room>;
+  static constexpr u32 gone = hits_type::gone;
 
  public:
   GART_HD GART_INLINE grouped_ray(Index const& index, traced_scene const& scene, P const& program, group_memory& memory,
-                                  index_t i, state_type& state)
+                                  index_t i, bool wanted, state_type& state)
       : index_(index),
         scene_(scene),
         program_(program),
@@ -51,211 +57,188 @@ class grouped_ray {
         own_(program.ray_of(i, state)),
         slab_(index.slab_of(own_)),
         last_t_(start_of_ray(scene, program, i)),
-        end_(end_of_ray(program, i)) {}
+        end_(end_of_ray(program, i)),
+        hits_(memory.hits),
+        alive_(wanted && index.tree.count > 0) {}
 
   GART_KERNEL GART_INLINE void trace() {
-    if (index_.tree.count == 0) return;
-    for (;;) {
-      u64 const from = passed_;
+    while (in_any_group(alive_)) {
       walk();
-      if (!alive_ || lost_ == nothing) return;
-      if (passed_ == from) return trace_alone();
+      alive_ = alive_ && hits_.lost() != hits_type::nothing;
+      bool const stuck = alive_ && !passed_;
+      if (in_any_group(stuck)) trace_alone(stuck);
+      alive_ = alive_ && !stuck;
     }
   }
 
  private:
-  GART_HD GART_INLINE static u64 key_of(float t, u32 id) { return u64{float_to_bits(t)} << 32 | id; }
-
   // Once through the tree, up to where something was lost.
   GART_KERNEL GART_INLINE void walk() {
-    lost_ = nothing, places_ = 1, hits_ = candidates_ = 0;
-    asked_ = 0;
+    hits_.clear();
+    passed_ = false, places_ = alive_ ? 1 : 0, candidates_ = 0;
     group_barrier();
     each_in_group([&](int l) {
       if (l == 0) m_.key[0] = m_.node[0] = 0;
     });
     group_barrier();
     float const near = last_t_;
-    for (;;) {
+    bool walks = alive_;
+    while (in_any_group(walks)) {
+      while (in_any_group(places_ + bvh_width - 1 > group_memory::node_room))
+        lose_node(places_ + bvh_width - 1 > group_memory::node_room);
       group_values<u32> least, at;
-      each_in_group([&](int l) {
-        least[l] = gone, at[l] = 0;
-        for (int k = l; k < places_; k += group_lanes)
-          if (m_.key[k] < least[l]) least[l] = m_.key[k], at[l] = static_cast<u32>(k);
-      });
-      u32 const nearest = least_in_group([&](int l) { return least[l]; });
-      if (nearest > reach()) break;  // or there is none
-      u32 const bound = candidates_ > 0 && unmet_ < nearest ? unmet_ : nearest;
-      if (hits_ >= group_lanes && bound > asked_) pass_on(bound);
-      if (!alive_) return;
-      u32 const place = of_lane(at, lowest_bit(group_where([&](int l) { return least[l] == nearest; })));
-      expand(remove_node(place), nearest, near);
-      if (candidates_ >= group_lanes) evaluate();
+      u32 const nearest = nearest_node(least, at);
+      bool const done = nearest > reach();  // or there is none
+      if (in_any_group(candidates_ >= group_lanes || (done && candidates_ > 0))) evaluate();
+      bool const ends = walks && done && candidates_ == 0;
+      u32 const bound = ends ? gone : candidates_ > 0 && unmet_ < nearest ? unmet_ : nearest;
+      bool const some = hits_.may_pass(bound);
+      if (in_any_group(some && (ends || hits_.size() >= group_lanes))) pass_on(some, bound);
+      walks = walks && alive_ && !ends;
+      if (!walks) places_ = candidates_ = 0, hits_.drop();
+      bool const goes_on = walks && !done;
+      if (in_any_group(goes_on)) expand(goes_on, of_lane(at, first_lane_of(least, nearest)), nearest, near);
     }
-    if (candidates_ > 0) evaluate();
-    pass_on(gone);
+  }
+
+  // The nearest entry of a node; gone where there is none.
+  GART_HD GART_INLINE u32 nearest_node(group_values<u32>& least, group_values<u32>& at) const {
+    each_in_group([&](int l) {
+      least[l] = gone, at[l] = 0;
+      for (int k = l; k < places_; k += group_lanes)
+        if (m_.key[k] < least[l]) least[l] = m_.key[k], at[l] = static_cast<u32>(k);
+    });
+    return least_in_group([&](int l) { return least[l]; });
   }
 
   // Nothing beyond is wanted.
   GART_HD GART_INLINE u32 reach() const {
-    u32 const end = float_to_bits(end_), lost = static_cast<u32>(lost_ >> 32);
+    u32 const end = float_to_bits(end_), lost = static_cast<u32>(hits_.lost() >> 32);
     return end < lost ? end : lost < gone ? lost : gone - 1;
   }
 
-  GART_HD GART_INLINE u32 remove_node(u32 place) {
-    u32 const node = m_.node[place];
-    --places_;
-    group_barrier();
-    each_in_group([&](int l) {
-      if (l == 0) m_.key[place] = m_.key[places_], m_.node[place] = m_.node[places_];
-    });
-    group_barrier();
-    return node;
-  }
-
-  // A lane a child. `key`: where the node is entered.
-  GART_HD GART_INLINE void expand(u32 node, u32 key, float near) {
+  // The node at a place gives way to its children, a lane each. `key`: where it is entered.
+  GART_HD GART_INLINE void expand(bool goes_on, u32 place, u32 key, float near) {
+    u32 const last = goes_on ? static_cast<u32>(places_) - 1 : 0, node = m_.node[place];
+    u32 const last_key = m_.key[last], last_node = m_.node[last];
     bvh_node const& n = index_.tree.nodes[node];
     group_values<u32> entry, child;
     group_values<bool> crossed;
     each_in_group([&](int c) {
+      crossed[c] = false;
+      if (!goes_on) return;
       float from;
       crossed[c] = cross_child(n, c, slab_, near, end_, from);
       entry[c] = from > 0 ? float_to_bits(from) : 0, child[c] = n.child[c];
     });
     u32 const all = group_where([&](int c) { return crossed[c]; });
     u32 const inner = all & n.inner_mask(), leaves = all & n.leaf_mask();
-    while (places_ + count_bits(inner) > group_memory::node_room) lose_node();
+    group_barrier();
     each_in_group([&](int c) {
+      if (c == 0 && place < last) m_.key[place] = last_key, m_.node[place] = last_node;
       if (inner >> c & 1u) {
-        int const to = places_ + count_bits(bits_before(inner, c));
+        int const to = static_cast<int>(last) + count_bits(bits_before(inner, c));
         m_.key[to] = entry[c], m_.node[to] = child[c];
       }
       if (leaves >> c & 1u) m_.candidate[candidates_ + count_bits(bits_before(leaves, c))] = child[c];
     });
     group_barrier();
     if (leaves) newest_ = key, unmet_ = candidates_ == 0 || key < unmet_ ? key : unmet_;
-    places_ += count_bits(inner), candidates_ += count_bits(leaves);
+    if (goes_on) places_ += count_bits(inner) - 1, candidates_ += count_bits(leaves);
   }
 
   // The farthest.
-  GART_HD GART_INLINE void lose_node() {
+  GART_HD GART_INLINE void lose_node(bool loses) {
     group_values<u32> most, at;
     each_in_group([&](int l) {
-      most[l] = 0, at[l] = static_cast<u32>(l);
+      most[l] = gone, at[l] = 0;
       for (int k = l; k < places_; k += group_lanes)
-        if (m_.key[k] >= most[l]) most[l] = m_.key[k], at[l] = static_cast<u32>(k);
+        if (~m_.key[k] <= most[l]) most[l] = ~m_.key[k], at[l] = static_cast<u32>(k);
     });
-    u32 const least = least_in_group([&](int l) { return ~most[l]; });
-    remove_node(of_lane(at, lowest_bit(group_where([&](int l) { return ~most[l] == least; }))));
-    lose(u64{~least} << 32);
+    u32 const least = least_in_group([&](int l) { return most[l]; }), place = of_lane(at, first_lane_of(most, least));
+    if (loses) --places_, hits_.lose(u64{~least} << 32);
+    group_barrier();
+    each_in_group([&](int l) {
+      if (loses && l == 0) m_.key[place] = m_.key[places_], m_.node[place] = m_.node[places_];
+    });
+    group_barrier();
   }
-  GART_HD GART_INLINE void lose(u64 key) { lost_ = key < lost_ ? key : lost_; }
 
   // A lane a candidate, those that were found first.
   GART_HD GART_INLINE void evaluate() {
-    while (hits_ + group_lanes > group_memory::hit_room) lose_hit();
     group_values<hit> found;
     group_values<bool> is_new;
+    group_values<u32> rest;
     each_in_group([&](int l) {
       is_new[l] = l < candidates_;
+      rest[l] = m_.candidate[group_lanes + l];
       if (!is_new[l]) return;
       u32 const id = m_.candidate[l];
       ray_gaussian const g = scene_.gaussians[id];
       ray_peak const r = gart::evaluate(g, own_);
-      is_new[l] = is_hit(g, r, scene_.near) && before(last_t_, last_id_, r.t, id) && key_of(r.t, id) < lost_;
+      is_new[l] = is_hit(g, r, scene_.near) && before(last_t_, last_id_, r.t, id) && r.t <= end_;
       if (is_new[l]) found[l] = {r.t, id, hit_alpha<Response>(g, r.d2)};
-    });
-    u32 const all = group_where([&](int l) { return is_new[l]; });
-    group_values<u32> rest;
-    each_in_group([&](int l) {
-      if (all >> l & 1u) m_.hits.put(hits_ + count_bits(bits_before(all, l)), found[l]);
-      rest[l] = m_.candidate[group_lanes + l];
     });
     group_barrier();
     each_in_group([&](int l) { m_.candidate[l] = rest[l]; });
-    group_barrier();
-    hits_ += count_bits(all), candidates_ = candidates_ > group_lanes ? candidates_ - group_lanes : 0;
+    hits_.add(candidates_ > 0, found, is_new);
+    candidates_ = candidates_ > group_lanes ? candidates_ - group_lanes : 0;
     // What is left is of the last node.
     unmet_ = newest_;
-    if (all) asked_ = 0;
   }
 
-  // Of the nearest hit, or of all bits of the keys turned: the farthest. What lanes found, for remove_hit.
-  GART_HD GART_INLINE u64 least_hit(u64 turned, group_values<u64>& best, group_values<u32>& at) const {
-    each_in_group([&](int l) {
-      best[l] = nothing, at[l] = 0;
-      for (int k = l; k < hits_; k += group_lanes) {
-        u64 const key = key_of(m_.hits.t[k], m_.hits.id[k]) ^ turned;
-        if (key < best[l]) best[l] = key, at[l] = static_cast<u32>(k);
-      }
-    });
-    return least_in_group([&](int l) { return best[l]; });
+  // The hits nearer than `bound`, which nothing that is left comes before; eight at a time.
+  GART_KERNEL GART_INLINE void pass_on(bool some, u32 bound) {
+    int const certain = hits_.put_in_order(some, bound);
+    for (int first = 0; in_any_group(alive_ && first < certain); first += group_lanes) {
+      int const left = alive_ ? certain - first : 0;
+      give(first, left < group_lanes ? left : group_lanes);
+    }
+    hits_.take_off(some, bound);
   }
-  // To a place of those that are ready, or (negative) to none.
-  GART_HD GART_INLINE void remove_hit(u64 key, group_values<u64>& best, group_values<u32>& at, int to) {
-    int const place = static_cast<int>(of_lane(at, lowest_bit(group_where([&](int l) { return best[l] == key; }))));
-    --hits_;
+
+  // Hits of the order, from `first`; none where there are 0 or fewer.
+  GART_KERNEL GART_INLINE void give(int first, int count) {
     each_in_group([&](int l) {
-      if (l != 0) return;
-      if (to >= 0) m_.ready.put(to, m_.hits.at(place));
-      m_.hits.put(place, m_.hits.at(hits_));
+      if (l >= count) return;
+      hit const h = hits_.at(first + l);
+      m_.ready.put(l, h);
+      if constexpr (takes_together<P> && shows_hits<P>) m_.shown[l] = program_.shade(state_, h.id);
     });
     group_barrier();
-  }
-  GART_HD GART_INLINE void lose_hit() {
-    group_values<u64> best;
-    group_values<u32> at;
-    u64 const key = least_hit(nothing, best, at);
-    remove_hit(key, best, at, -1);
-    lose(~key);
-  }
-
-  // The hits nearer than `bound`, which nothing that is left comes before.
-  GART_KERNEL GART_INLINE void pass_on(u32 bound) {
-    for (bool more = true; more && alive_;) {
-      int count = 0;
-      for (; count < group_lanes; ++count) {
-        group_values<u64> best;
-        group_values<u32> at;
-        u64 const key = least_hit(0, best, at);
-        asked_ = static_cast<u32>(key >> 32);
-        more = asked_ < bound && key < lost_ && hits_ > 0;
-        if (!more) break;
-        remove_hit(key, best, at, count);
-      }
-      if (count > 0) give(count);
-    }
-  }
-
-  GART_KERNEL GART_INLINE void give(int count) {
-    if constexpr (shades_apart<P>) {
-      each_in_group([&](int l) {
-        if (l < count) m_.shown[l] = program_.shade(state_, m_.ready.id[l]);
-      });
-      group_barrier();
-    }
-    group_values<bool> alive;
-    each_in_group([&](int l) {
-      alive[l] = true;
-      if (l != 0) return;
-      for (int k = 0; k < count && alive[l]; ++k) {
-        if constexpr (shades_apart<P>)
-          alive[l] = program_.on_hit(state_, m_.ready.at(k), m_.shown[k]);
+    bool goes_on = true;
+    if constexpr (takes_together<P>) {
+      group_values<typename P::taken_hit> all;
+      int taken = 0;
+      while (goes_on && taken < count) {
+        typename P::taken_hit one;
+        if constexpr (shows_hits<P>)
+          goes_on = program_.take(state_, m_.ready.at(taken), m_.shown[taken], one);
         else
-          alive[l] = program_.on_hit(state_, m_.ready.at(k));
+          goes_on = program_.take(state_, m_.ready.at(taken), one);
+        give_lane(all, taken++, one);
       }
-    });
-    alive_ = of_lane(alive, 0);
-    last_t_ = m_.ready.t[count - 1], last_id_ = m_.ready.id[count - 1], passed_ += static_cast<u64>(count);
+      program_.keep_together(state_, static_cast<u32>(taken), all);
+    } else {
+      group_values<bool> more;
+      each_in_group([&](int l) {
+        more[l] = true;
+        if (l != 0) return;
+        for (int k = 0; k < count && more[l]; ++k) more[l] = program_.on_hit(state_, m_.ready.at(k));
+      });
+      goes_on = of_lane(more, 0);
+    }
+    if (count > 0) last_t_ = m_.ready.t[count - 1], last_id_ = m_.ready.id[count - 1], passed_ = true;
+    alive_ = alive_ && goes_on;
     group_barrier();
   }
 
-  GART_KERNEL void trace_alone() {
+  GART_KERNEL void trace_alone(bool stuck) {
     group_barrier();
     each_in_group([&](int l) {
-      if (l != 0) return;
-      lone_ray<Response, ray_type, group_memory::hit_room, 1> ray{scene_, own_, last_t_, last_id_, end_, m_.hits, 0};
+      if (l != 0 || !stuck) return;
+      lone_ray<Response, ray_type, group_memory::hit_room, 1> ray{scene_,          own_, last_t_, last_id_, end_,
+                                                                  m_.hits.waiting, 0};
       ray.trace(index_, program_, state_);
     });
     group_barrier();
@@ -265,24 +248,23 @@ class grouped_ray {
   traced_scene const& scene_;
   P const& program_;
   group_memory& m_;
-  state_type& state_;
+  state_type& state_;  // on a device each lane has its own, which are the same, or lane 0's alone counts
   ray_type own_;
   slab_ray slab_;
   float last_t_;  // the last hit passed on
   u32 last_id_ = 0xffffffffu;
-  float end_;           // of the ray
-  u64 lost_ = nothing;  // hits before this (t, id) are certain
-  u64 passed_ = 0;      // hits
-  int places_ = 0, hits_ = 0, candidates_ = 0;
+  float end_;  // of the ray
+  hits_type hits_;
+  int places_ = 0, candidates_ = 0;
   u32 unmet_ = 0, newest_ = 0;  // the nearest entry of a node that candidates are of; that of the last such node
-  u32 asked_ = 0;               // hits are not ready before this distance
-  bool alive_ = true;
+  bool passed_ = false;         // a hit, in this walk
+  bool alive_;
 };
 
 // The rays of a launch that are no beams, eight lanes each.
 template <class Response, class Index, ray_program P>
 struct walk_groups {
-  static constexpr int block_size = 32, min_blocks = 24, rays_at_once = block_size / group_lanes;
+  static constexpr int block_size = 32, min_blocks = 20, rays_at_once = block_size / group_lanes;
 
   Index index;
   traced_scene scene;
@@ -304,14 +286,16 @@ struct walk_groups {
   }
 
  private:
+  // Groups without a ray come along.
   GART_KERNEL GART_INLINE void trace(group_memory& memory, index_t at) const {
-    if (at >= rays || (apart && !apart[at / beam_lanes])) return;
-    index_t const i = order ? order[at] : at;
-    if (!program.active(i)) return;
+    bool wanted = at < rays && (!apart || apart[at / beam_lanes]);
+    if (!in_any_group(wanted)) return;
+    index_t const i = wanted ? (order ? order[at] : at) : 0;
+    wanted = wanted && program.active(i);
     auto state = program.begin(i);
-    grouped_ray<Response, Index, P>(index, scene, program, memory, i, state).trace();
+    grouped_ray<Response, Index, P>(index, scene, program, memory, i, wanted, state).trace();
     each_in_group([&](int l) {
-      if (l == 0) program.end(i, state);
+      if (l == 0 && wanted) program.end(i, state);
     });
   }
 };

@@ -1,7 +1,9 @@
 #pragma once
 /// \file
 /// Eight lanes that go through a tree with one ray (trace/group_walk.hpp), and what they find out together. On a device
-/// they are threads of a warp, four groups to each. On a host one thread is all lanes, one after the other.
+/// they are threads of a warp, four groups to each. All four take every step together, those with nothing to do in it
+/// too: threads of a warp that part would go one group after the other. On a host one thread is all lanes of one group,
+/// one after the other.
 
 #include <gart/math/arith.hpp>
 
@@ -26,8 +28,8 @@ struct group_values {
 
 /// The calling lane's number in its group.
 __device__ GART_INLINE int lane_in_group() { return static_cast<int>(threadIdx.x) % group_lanes; }
-/// The threads of its warp that are in its group.
-__device__ GART_INLINE u32 group_mask() { return 0xffu << (threadIdx.x % 32 / group_lanes * group_lanes); }
+/// The threads that take a step together.
+inline constexpr u32 whole_warp = 0xffffffffu;
 
 #endif
 
@@ -44,7 +46,16 @@ GART_HD GART_INLINE void each_in_group(F&& f) {
 /// What lanes wrote to the memory that they share is there for all of them.
 GART_HD GART_INLINE void group_barrier() {
 #if defined(__CUDA_ARCH__)
-  __syncwarp(group_mask());
+  __syncwarp();
+#endif
+}
+
+/// Whether it is so in any group that takes the step.
+GART_HD GART_INLINE bool in_any_group(bool so) {
+#if defined(__CUDA_ARCH__)
+  return __any_sync(whole_warp, so);
+#else
+  return so;
 #endif
 }
 
@@ -52,7 +63,7 @@ GART_HD GART_INLINE void group_barrier() {
 template <class F>
 GART_HD GART_INLINE u32 group_where(F&& f) {
 #if defined(__CUDA_ARCH__)
-  return __ballot_sync(group_mask(), f(lane_in_group())) >> (threadIdx.x % 32 / group_lanes * group_lanes) & 0xffu;
+  return __ballot_sync(whole_warp, f(lane_in_group())) >> (threadIdx.x % 32 / group_lanes * group_lanes) & 0xffu;
 #else
   u32 bits = 0;
   for (int lane = 0; lane < group_lanes; ++lane) bits |= (f(lane) ? 1u : 0u) << lane;
@@ -67,7 +78,7 @@ GART_HD GART_INLINE auto least_in_group(F&& f) {
   auto least = f(lane_in_group());
   GART_UNROLL
   for (int step = group_lanes / 2; step > 0; step /= 2) {
-    auto const other = __shfl_xor_sync(group_mask(), least, step);
+    auto const other = __shfl_xor_sync(whole_warp, least, step);
     least = other < least ? other : least;
   }
   return least;
@@ -81,11 +92,36 @@ GART_HD GART_INLINE auto least_in_group(F&& f) {
 #endif
 }
 
+/// The sum of the lanes' numbers.
+template <class F>
+GART_HD GART_INLINE auto sum_in_group(F&& f) {
+#if defined(__CUDA_ARCH__)
+  auto sum = f(lane_in_group());
+  GART_UNROLL
+  for (int step = group_lanes / 2; step > 0; step /= 2) sum += __shfl_xor_sync(whole_warp, sum, step);
+  return sum;
+#else
+  auto sum = f(0);
+  for (int lane = 1; lane < group_lanes; ++lane) sum += f(lane);
+  return sum;
+#endif
+}
+
+/// Gives one lane a value that all of them know.
+template <class T>
+GART_HD GART_INLINE void give_lane(group_values<T>& values, int lane, T const& value) {
+#if defined(__CUDA_ARCH__)
+  if (lane_in_group() == lane) values.value = value;
+#else
+  values.value[lane] = value;
+#endif
+}
+
 /// The value of one lane.
 template <class T>
 GART_HD GART_INLINE T of_lane(group_values<T>& values, int lane) {
 #if defined(__CUDA_ARCH__)
-  return __shfl_sync(group_mask(), values.value, lane, group_lanes);
+  return __shfl_sync(whole_warp, values.value, lane, group_lanes);
 #else
   return values.value[lane];
 #endif
