@@ -14,5 +14,6 @@
 #include <gart/runtime/path_renderer.hpp>
 #include <gart/runtime/renderer.hpp>
 #include <gart/runtime/session.hpp>
+#include <gart/runtime/shared_model.hpp>
 #include <gart/runtime/track.hpp>
 #include <gart/runtime/validation.hpp>

@@ -3,6 +3,7 @@
 /// The templates of training, rendering, rays, paths and the reference, on the host policies. Kernels on CUDA need nvcc
 /// and exec/cuda_launch.cuh first.
 
+#include <gart/actors/actor_tracer.hpp>
 #include <gart/backward/backward.hpp>
 #include <gart/bvh/walk.hpp>
 #include <gart/camera/models.hpp>

@@ -104,6 +104,23 @@ compiled_configuration const& find_configuration(configuration_request const& re
                     "gart/runtime/compiled_configurations.hpp, shown by examples/5_own_configuration");
 }
 
+void require_shared(shared_model const* model, configuration_info const& own, int device) {
+  if (!model) throw invalid_argument("renderer.share_model: the shared model is null: make_shared_model makes one");
+  configuration_request const& its = model->request();
+  auto const require = [](bool same, char const* what, std::string const& one, std::string const& other) {
+    if (!same)
+      throw invalid_argument(std::string("renderer.share_model: the shared model is of ") + what + " " + one +
+                             ", and the renderer of " + other +
+                             ": make both by the same backend, device and degrees of configuration_request");
+  };
+  require(its.backend == own.backend, "backend", to_string(its.backend), to_string(own.backend));
+  require(its.device == device, "device", std::to_string(its.device), std::to_string(device));
+  require(its.sh_degree == own.sh_degree, "SH degree", std::to_string(its.sh_degree), std::to_string(own.sh_degree));
+  require(its.kernel_degree == own.kernel_degree, "kernel degree", std::to_string(its.kernel_degree),
+          std::to_string(own.kernel_degree));
+  require(model->compiled_for() == own.instruction_set, "instruction set", model->compiled_for(), own.instruction_set);
+}
+
 void register_configuration(compiled_configuration const& entry) { configurations().push_back(entry); }
 
 configuration_info resolve(configuration_request const& request) {

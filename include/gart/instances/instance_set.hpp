@@ -20,9 +20,8 @@
 /// instance that has moved, three an instance back. Errors: those of instance.hpp.
 
 #include <gart/exec/parallel.hpp>
-#include <gart/instances/instance.hpp>
+#include <gart/instances/require_instances.hpp>
 #include <gart/pose/differentiate_pose.hpp>
-#include <gart/scene/similarity.hpp>
 
 #include <algorithm>
 #include <string>
@@ -102,34 +101,6 @@ gaussians_view<T> rows_of(gaussians_view<T> const& all, index_t first, index_t c
 }
 
 }  // namespace instance_kernels
-
-/// Throws invalid_argument for a list that is no scene.
-inline void require_instances(span<gaussians_view<float const> const> models, span<instance const> instances,
-                              int sh_degree) {
-  auto const refuse = [](std::size_t i, std::string const& what) {
-    throw invalid_argument("instances[" + std::to_string(i) + "]" + what);
-  };
-  if (instances.empty()) throw invalid_argument("instances: there are none: a scene needs at least one");
-  for (std::size_t m = 0; m < models.size(); ++m)
-    if (models[m].sh_degree < 0 || models[m].sh_degree > sh_degree)
-      throw invalid_argument("instances: models[" + std::to_string(m) + "] is of SH degree " +
-                             std::to_string(models[m].sh_degree) + ", and the scene of " + std::to_string(sh_degree) +
-                             ": make the scene's at least that");
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < instances.size(); ++i) {
-    instance const& one = instances[i];
-    if (one.model >= models.size())
-      refuse(i, ".model is " + std::to_string(one.model) + ", and there are " + std::to_string(models.size()) +
-                    " models: numbers begin at 0");
-    if (!is_rotation(one.rotation))
-      refuse(i, ".rotation is none: its columns must be finite, of length 1 and at right angles, without reflection");
-    if (!(one.scale > 0 && std::isfinite(one.scale))) refuse(i, ".scale must be more than 0 and finite");
-    for (int k = 0; k < 3; ++k)
-      if (!std::isfinite(one.position[k])) refuse(i, ".position is not finite");
-    count += models[one.model].count;
-  }
-  require_count(count);
-}
 
 /// The scene and its memory.
 template <execution E>

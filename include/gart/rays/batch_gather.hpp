@@ -93,10 +93,7 @@ struct sum_piece {
     u32 const place = places[k];
     hit_entry const entry = entries[place];
     differentiated_ray const from = rays[runs.ray_of(place)];
-    vec3 const g = from.by_color, opaque = entry.color();
-    float const w = entry.weight();
-    vec3 const c(entry.clamped(0) ? 0.0f : w * g.x, entry.clamped(1) ? 0.0f : w * g.y,
-                 entry.clamped(2) ? 0.0f : w * g.z);
+    vec3 const c = color_gradient_of(entry, from.by_color);
     sh_basis<color_rows::most> const basis(from.direction);
     GART_UNROLL
     for (int b = 0; b < bands; ++b) {
@@ -104,9 +101,9 @@ struct sum_piece {
       color[3 * b] += basis.y[b] * c.x, color[3 * b + 1] += basis.y[b] * c.y, color[3 * b + 2] += basis.y[b] * c.z;
     }
     ray_peak const r = evaluate(gaussian, from.own());
-    float const opaque_g = opaque.x * g.x + opaque.y * g.y + opaque.z * g.z + depths[place] * from.by_depth;
-    float const by_alpha = alpha_gradient(opaque_g, from.total, estimated_hit_alpha<Response>(gaussian, r.d2));
-    moments_of<float> const m = hit_moments_with_depth<Response>(gaussian, r, by_alpha, w * from.by_depth, true);
+    float const by_alpha = alpha_gradient_of<Response>(entry, depths[place], from, gaussian, r);
+    moments_of<float> const m =
+        hit_moments_with_depth<Response>(gaussian, r, by_alpha, entry.weight() * from.by_depth, true);
     GART_UNROLL
     for (int i = 0; i < error_place; ++i) moment[i] += m.v[i];
   }

@@ -25,6 +25,34 @@ struct alignas(16) differentiated_ray {
 };
 static_assert(sizeof(differentiated_ray) == 48);
 
+/// dL/d colour of a hit that was kept, of a ray of gradient g.
+GART_HD GART_INLINE vec3 color_gradient_of(hit_entry const& entry, vec3 const& g) {
+  float const w = entry.weight();
+  return {entry.clamped(0) ? 0.0f : w * g.x, entry.clamped(1) ? 0.0f : w * g.y, entry.clamped(2) ? 0.0f : w * g.z};
+}
+
+/// Its dL/dalpha. `depth`: what the ray's would be if the hit were opaque.
+template <class Response>
+GART_HD GART_INLINE float alpha_gradient_of(hit_entry const& entry, float depth, differentiated_ray const& from,
+                                            ray_gaussian const& gaussian, ray_peak const& r) {
+  vec3 const g = from.by_color, opaque = entry.color();
+  float const opaque_g = opaque.x * g.x + opaque.y * g.y + opaque.z * g.z + depth * from.by_depth;
+  return alpha_gradient(opaque_g, from.total, estimated_hit_alpha<Response>(gaussian, r.d2));
+}
+
+/// dL/dw of a small turn of a ray by the colour of Gaussian `id` that it sees, whose gradient is g.
+GART_HD GART_INLINE vec3 turn_by_color(color_rows const& colors, sh_basis<color_rows::most> const& basis, u32 id,
+                                       vec3 const& g) {
+  constexpr int bands = sh_basis<color_rows::most>::size;
+  float const* const row = colors.sh + static_cast<std::size_t>(3 * sh_coefficients(colors.stored_degree)) * id;
+  int const active = sh_coefficients(colors.active_degree);
+  float by_band[bands];
+  GART_UNROLL
+  for (int k = 0; k < bands; ++k)
+    by_band[k] = k < active ? row[3 * k] * g.x + row[3 * k + 1] * g.y + row[3 * k + 2] * g.z : 0.0f;
+  return sh_turn<color_rows::most, 1>(by_band, basis.y);
+}
+
 namespace ray_kernels {
 
 // Null where there is no such gradient.
@@ -142,7 +170,7 @@ struct batch_scatter : ray_program_base {
     if (of_rays.origins || of_rays.directions) {
       ray_part const part = ray_part_of(gaussian, r, m, weight * s.by_depth);
       s.by_origin += part.origin, s.by_direction += part.direction;
-      add_turn(s, h.id, g);
+      s.by_turn += turn_by_color(colors, s.basis, h.id, g);
     }
     return s.gradient.transmittance >= transmittance_min && --s.left != 0;
   }
@@ -183,15 +211,6 @@ struct batch_scatter : ray_program_base {
         E::atomic_add_row(row + 3 * k, sum, 3);
       }
     }
-  }
-  GART_HD GART_INLINE void add_turn(state& s, u32 id, vec3 const& g) const {
-    float const* const row = colors.sh + static_cast<std::size_t>(3 * sh_coefficients(colors.stored_degree)) * id;
-    int const active = sh_coefficients(colors.active_degree);
-    float by_band[bands];
-    GART_UNROLL
-    for (int k = 0; k < bands; ++k)
-      by_band[k] = k < active ? row[3 * k] * g.x + row[3 * k + 1] * g.y + row[3 * k + 2] * g.z : 0.0f;
-    s.by_turn += sh_turn<color_rows::most, 1>(by_band, s.basis.y);
   }
 };
 

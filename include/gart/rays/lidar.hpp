@@ -78,7 +78,7 @@ inline lidar_slice rays_during(lidar_pattern const& pattern, float from, float t
   return out;
 }
 
-/// The pattern's rays in the world, in its order. t_max: where they end; 0: nowhere.
+/// The pattern's rays in the world, in its order, with its times. t_max: where they end; 0: nowhere.
 inline ray_list rays_of(lidar_pattern const& pattern, sensor_pose const& pose, float t_max = 0) {
   std::size_t const n = pattern.directions.size() / 3;
   if (pattern.directions.size() % 3 != 0 || (!pattern.times.empty() && pattern.times.size() != n))
@@ -111,6 +111,7 @@ inline ray_list rays_of(lidar_pattern const& pattern, sensor_pose const& pose, f
     for (int k = 0; k < 3; ++k) out.directions.push_back(static_cast<float>(world[k]));
   }
   if (t_max > 0) out.t_max.assign(n, t_max);
+  out.times = pattern.times;
   return out;
 }
 

@@ -28,6 +28,7 @@ struct ray_batch {
   span<float const> origins = {};     ///< [R][3]; empty: all rays begin at the frame
   span<float const> directions = {};  ///< [R][3]
   span<float const> t_max = {};       ///< [R], hits lie at t <= t_max; empty: rays have no end
+  span<float const> times = {};       ///< [R], when rays look; read where models move (actors/), else not looked at
 
   /// R.
   index_t count() const { return static_cast<index_t>(directions.size() / 3); }
@@ -37,9 +38,10 @@ struct ray_batch {
 struct ray_list {
   vec3d frame{0.0};                               ///< that origins are relative to
   std::vector<float> origins, directions, t_max;  ///< as ray_batch has them
+  std::vector<float> times = {};                  ///< the same
 
   /// While this is.
-  ray_batch batch() const { return {frame, origins, directions, t_max}; }
+  ray_batch batch() const { return {frame, origins, directions, t_max, times}; }
 };
 
 /// In place of a Gaussian, where a ray has none.
@@ -104,6 +106,8 @@ inline void require_batch(ray_batch const& rays) {
     refuse("origins", rays.origins.size(), of_rays + std::to_string(3 * n) + ", or none where all begin at the frame");
   if (!rays.t_max.empty() && rays.t_max.size() != n)
     refuse("t_max", rays.t_max.size(), of_rays + std::to_string(n) + ", or none where rays have no end");
+  if (!rays.times.empty() && rays.times.size() != n)
+    refuse("times", rays.times.size(), of_rays + std::to_string(n) + ", or none where nothing moves");
   for (int k = 0; k < 3; ++k)
     if (!(rays.frame[k] - rays.frame[k] == 0)) throw invalid_argument("ray_batch.frame is not finite");
 }

@@ -12,6 +12,36 @@
 
 namespace gart { inline namespace GART_ISA {
 
+/// A model for renderers that share it. Its policy has a queue of its own, so that no renderer has to outlive it.
+template <execution E, class Response>
+class compiled_shared_model final : public shared_model {
+ public:
+  /// Waits until all of it is there.
+  compiled_shared_model(configuration_request const& request, gaussian_model const& model,
+                        render_options const& options, vec3d const& frame)
+      : request_(request),
+        exec_(policy_of<E>(request_)),
+        gaussians_(exec_, model),
+        features_(exec_, model.features),
+        channels_{{features_.data(), gaussians_.size(), model.feature_count}},
+        tree_(exec_, std::as_const(gaussians_).view(), options.alpha_min, frame) {}
+  configuration_request const& request() const override { return request_; }
+  char const* compiled_for() const override { return E::device ? "" : instruction_set; }
+  gaussians_view<float const> gaussians() const override { return gaussians_.view(); }
+  gaussian_channels channels() const override { return channels_; }
+  std::size_t bytes() const override { return exec_.memory.current; }
+  /// For tracers.
+  shared_index<E, Response> const& tree() const { return tree_; }
+
+ private:
+  configuration_request request_;
+  E exec_;
+  gart::gaussians<E> gaussians_;
+  buffer<float, E> features_;
+  gaussian_channels channels_;
+  shared_index<E, Response> tree_;
+};
+
 /// The service of a policy and a response.
 template <execution E, class Response>
 class compiled_rays final : public ray_service {
@@ -21,6 +51,10 @@ class compiled_rays final : public ray_service {
 
   void set_scene(gaussians_view<float const> scene, int active_degree) override {
     tracer_.set_scene(scene, active_degree);
+  }
+  void share(shared_model const* model) override {
+    auto const* const own = dynamic_cast<compiled_shared_model<E, Response> const*>(model);
+    tracer_.share(own ? &own->tree() : nullptr);
   }
   void set_channels(gaussian_channels const& channels) override {
     tracer_.set_channels(channels), features_ = channels.features.width;
@@ -86,10 +120,17 @@ class compiled_rays final : public ray_service {
 /// The service of a policy and a response, for all renderers of theirs, and scenes of instances.
 template <execution E, class Response = generalized_gaussian<>>
 void register_rays() {
-  register_ray_service(from_string(E::name, backend_kind::automatic), Response::degree,
-                       [](configuration_request const& request) -> std::unique_ptr<ray_service> {
-                         return std::make_unique<compiled_rays<E, Response>>(request);
-                       });
+  register_ray_service(
+      from_string(E::name, backend_kind::automatic), Response::degree,
+      [](configuration_request const& request) -> std::unique_ptr<ray_service> {
+        return std::make_unique<compiled_rays<E, Response>>(request);
+      },
+      [](configuration_request const& request, gaussian_model const& model, render_options const& options,
+         vec3d const& frame) -> std::shared_ptr<shared_model const> {
+        configuration_request own = request;
+        own.stream = nullptr;
+        return std::make_shared<compiled_shared_model<E, Response>>(own, model, options, frame);
+      });
   register_instances<E>();
 }
 

@@ -49,15 +49,23 @@ class compiled_renderer final : public renderer {
   void set_model(gaussian_model const& model) override {
     require_degree(model.sh_degree);
     require_arrays(model);
+    drop_shared();
     differentiated_ = 0, ++models_;
     degree_ == sh_degree ? model_.assign(model) : model_.assign(with_sh_degree(model, sh_degree));
     given_ = scene_ = std::as_const(model_).view();
     channels_.set_model(model);
     is_bound_ = false, bound_bands_ = nullptr;
   }
+  void share_model(std::shared_ptr<shared_model const> model) override {
+    require_shared(model.get(), configuration(), request_.device);
+    bind(model->gaussians());
+    bind_channels(model->channels());
+    is_bound_ = false, shared_ = std::move(model);  // nobody writes to it
+  }
   void bind(gaussians_view<float const> parameters) override {
     require_degree(parameters.sh_degree);
     require_arrays(parameters, "renderer.bind");
+    drop_shared();
     differentiated_ = 0, ++models_;
     given_ = scene_ = parameters;
     channels_.bind({}, parameters.count);
@@ -217,6 +225,15 @@ class compiled_renderer final : public renderer {
     require_arrays(gradients, "forward_context.backward");
     require_degree(gradients.sh_degree);
   }
+  // A shared model goes after what was asked for of it is done; there is none then.
+  void drop_shared() {
+    if (!shared_) return;
+    wait();
+    if (rays_) rays_->share(nullptr);
+    given_ = scene_ = gaussians_view<float const>{.sh_degree = sh_degree};
+    channels_.bind({}, 0), bound_bands_ = nullptr, ++models_;
+    shared_.reset();
+  }
   // The service, and the Gaussians in it.
   ray_service& rays() {
     if (!rays_) {
@@ -227,7 +244,7 @@ class compiled_renderer final : public renderer {
       rays_ = make_ray_service(request);
     }
     bool const other = is_bound_ || rays_model_ != models_ || models_ == 0;
-    if (other) rays_->set_scene(given_, degree_);
+    if (other) rays_->share(shared_.get()), rays_->set_scene(given_, degree_);
     if (other || channels_are_old_) rays_->set_channels(channels_.now());
     rays_model_ = models_, channels_are_old_ = false;
     return *rays_;
@@ -301,6 +318,7 @@ class compiled_renderer final : public renderer {
     return images;
   }
 
+  std::shared_ptr<shared_model const> shared_;  // goes last: policies wait for what reads it
   configuration_request request_;
   int degree_;              // of the model
   u64 differentiated_ = 0;  // the frame's preparation that gradients_ are of; 0: they are of none

@@ -7,6 +7,7 @@
 #include <gart/render/options.hpp>
 #include <gart/runtime/forward_context.hpp>
 #include <gart/runtime/request.hpp>
+#include <gart/runtime/shared_model.hpp>
 
 #include <memory>
 
@@ -19,6 +20,9 @@ class ray_service {
   virtual ~ray_service() = default;
   /// Sets the Gaussians, whose arrays must stay. Call again when they may have changed. Waits for the policy.
   virtual void set_scene(gaussians_view<float const> scene, int active_degree) = 0;
+  /// A model whose tree batches are traced by where it is that of the Gaussians; null: none. It must stay until another
+  /// is given.
+  virtual void share(shared_model const* model) = 0;
   /// What these have besides, after set_scene.
   virtual void set_channels(gaussian_channels const& channels) = 0;
   /// From and to host memory.
@@ -36,8 +40,11 @@ class ray_service {
 
 /// Makes the service that a request asks for.
 using ray_service_maker = std::unique_ptr<ray_service> (*)(configuration_request const&);
-/// Adds one to the table; before main, from static initialisers.
-void register_ray_service(backend_kind backend, int kernel_degree, ray_service_maker make);
+/// Makes a model for renderers that share it.
+using shared_model_maker = std::shared_ptr<shared_model const> (*)(configuration_request const&, gaussian_model const&,
+                                                                   render_options const&, vec3d const& frame);
+/// Adds both to the table; before main, from static initialisers.
+void register_ray_service(backend_kind backend, int kernel_degree, ray_service_maker make, shared_model_maker share);
 /// For the backend, the kernel degree, the device, the stream and the threads of a request. Errors: unsupported, naming
 /// those there are.
 std::unique_ptr<ray_service> make_ray_service(configuration_request const& request);

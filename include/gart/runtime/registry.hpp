@@ -38,6 +38,9 @@ inline void require_tree(int rebuild_every, tracer_kind tracer) {
                            " builds no tree: leave it at 1, or use configuration_request.tracer = bvh");
 }
 
+/// A renderer takes a shared model that was made for what it is itself.
+void require_shared(shared_model const* model, configuration_info const& own, int device);
+
 /// For policies that every machine has.
 inline bool always_available(std::string*) { return true; }
 

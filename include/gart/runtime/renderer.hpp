@@ -9,6 +9,8 @@
 ///
 /// Memory "of the policy" is device memory of the request's device for cuda, host memory for the others.
 ///
+/// A renderer, with its contexts, serves one thread at a time.
+///
 /// Every renderer also traces batches of any rays (rays/ray_batch.hpp). forward() keeps the data for the gradient of a
 /// view or of a batch; any number of contexts may wait.
 ///
@@ -23,6 +25,7 @@
 #include <gart/render/rendered.hpp>
 #include <gart/runtime/forward_context.hpp>
 #include <gart/runtime/request.hpp>
+#include <gart/runtime/shared_model.hpp>
 #include <gart/scene/camera.hpp>
 #include <gart/scene/gaussians.hpp>
 
@@ -48,6 +51,8 @@ class renderer {
 
   /// Copies the model, with its features; bound arrays are no longer used.
   virtual void set_model(gaussian_model const& model) = 0;
+  /// Reads a model that other renderers read too, with its features and its tree (runtime/shared_model.hpp).
+  virtual void share_model(std::shared_ptr<shared_model const> model) = 0;
   /// The arrays, in memory of the policy, must stay until another model is set or bound. Values written to them between
   /// two views count for the second, on the same stream.
   virtual void bind(gaussians_view<float const> parameters) = 0;
