@@ -1,5 +1,6 @@
 // Lanes of floats against floats: the formulas of math/ give each lane the bits they give a float alone.
 #include <gart/math/hit_gradient.hpp>
+#include <gart/math/lane_transpose.hpp>
 #include <gart/math/lanes.hpp>
 #include <gart/math/sh.hpp>
 #include <gart/render/pixels.hpp>

@@ -5,6 +5,7 @@
 
 #include <gart/backward/hit_layout.hpp>
 #include <gart/backward/hit_slot.hpp>
+#include <gart/math/lane_transpose.hpp>
 #include <gart/trace/packet_cell.hpp>
 
 #include <type_traits>
