@@ -7,6 +7,8 @@
 #include <gart/backward/gather.hpp>
 #include <gart/backward/packet_slots.hpp>
 
+#include <new>
+
 namespace gart { inline namespace GART_ISA {
 
 #if defined(__CUDACC__)
@@ -141,9 +143,9 @@ struct packet_gather {
     int count = 0;
     for (packet_data const& at : s.data) {
       auto& f = found[count];
+      if (!cell.bits_inside(at.x, at.y)) continue;
       f.at = &at, f.slots = packet_slots(cell, at.x, at.y);
-      if (!any(f.slots.inside)) continue;
-      f.r = evaluate(g, primary_ray_of<lanes>{at.direction});
+      ::new (static_cast<void*>(&f.r)) ray_peak_of<lanes>(evaluate(g, primary_ray_of<lanes>{at.direction}));
       f.hit = f.slots.inside;
       if constexpr (recomputed)
         f.hit &= is_hit(g, f.r, gather.near) &

@@ -27,11 +27,13 @@ struct packet_cell {
     rows = (~u64{0} >> (64 - 4 * cell.height()) << 4 * y) & 0x1111111111111111u;
   }
 
-  /// The pixels of the packet at (x, y) in the tile that are in the box.
-  GART_INLINE lane_mask inside(int x, int y) const {
+  /// The pixels of the packet at (x, y) in the tile that are in the box, a bit a lane.
+  GART_INLINE u32 bits_inside(int x, int y) const {
     constexpr u32 one_a_row = lane_count == 16 ? 0x1111u : lane_count == 8 ? 0x11u : 1u;
-    return lanes_of((columns >> x & 15u) * (static_cast<u32>(rows >> 4 * y) & one_a_row));
+    return (columns >> x & 15u) * (static_cast<u32>(rows >> 4 * y) & one_a_row);
   }
+  /// The same as a mask.
+  GART_INLINE lane_mask inside(int x, int y) const { return lanes_of(bits_inside(x, y)); }
 };
 
 }}  // namespace gart::GART_ISA

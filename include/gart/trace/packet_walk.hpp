@@ -46,7 +46,7 @@ class packet_walk {
         int n = 0;
         for (; k < cells && n < batch; ++k) {
           near_[n] = static_cast<u16>(k);
-          n += any(cells_[k].inside(x, y)) ? 1 : 0;
+          n += cells_[k].bits_inside(x, y) ? 1 : 0;
         }
         if (count_ >= pass_threshold) {
           pass_on(program, state, depth_of_t, bound);
