@@ -83,7 +83,7 @@ TEST_CASE("lanes: numbers in turns and in fours") {
   gart::lanes from[4], to[4];
   for (int k = 0; k < 4; ++k)
     for (int l = 0; l < gart::lane_count; ++l) from[k].v[l] = static_cast<float>(100 * k + l + 1);
-  for (int n : {3, 12, 27, 48}) {
+  for (int n : {3, 12, 24, 27, 48}) {
     if (n > 3 * gart::lane_count) continue;
     std::vector<float> turns(static_cast<std::size_t>(n) + 1, -1.0f);
     gart::write_interleaved(turns.data(), n, from[0], from[1], from[2]);
