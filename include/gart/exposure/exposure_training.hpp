@@ -6,7 +6,7 @@
 ///
 /// The identity shows the scene's colours. Only the start at the identity keeps the views' mean exposure near it.
 ///
-/// Adam's epsilon is 0.03, large beside the usual one. The loss is a mean over pixels, so a photograph a tenth too
+/// Adam's epsilon is 0.03, large beside the usual one. The loss is a mean over pixels. So a photograph a tenth too
 /// bright gives gradients of a few tenths at any size. Smaller gradients come mostly from Gaussians that have not
 /// settled. Adam alone would scale these up to whole steps.
 ///
