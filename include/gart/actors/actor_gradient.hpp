@@ -6,13 +6,16 @@
 /// the pose by track_step::pull_back_to_end. A distance t of the world is t / s there, and its gradient s times that.
 /// Nothing is atomic: the same bits in every run.
 ///
-/// Memory: 100 bytes a ray for the keys of a track, and 96 a piece of 64 rays.
+/// Memory: 16 bytes a hit, 100 a ray for the keys of a track, and 96 a piece of 64 rays.
 
 #include <gart/actors/moved_rays.hpp>
+#include <gart/algorithm/sort_pairs.hpp>
 #include <gart/backward/finish.hpp>
 #include <gart/channels/gaussian_order.hpp>
 #include <gart/rays/batch_gather.hpp>
 #include <gart/render/frame.hpp>
+
+#include <bit>
 
 namespace gart { inline namespace GART_ISA {
 
@@ -43,21 +46,25 @@ struct move_differentiated {
   }
 };
 
-// An actor's hits as those of a batch.
+// Whose an actor's hits are.
+struct ray_of_hit {
+  u32 const* rays;
+  GART_HD u32 ray_of(u32 place) const { return rays[place]; }
+};
+
+// An actor's hits as those of a batch; the id of one that was not composited is past the last Gaussian.
 struct pick_hits {
   actor_hits_view hits;
   float to_own;  // 1 / s
-  int ray_bits;
-  u64 no_key;
-  u64* keys;
-  hit_entry* entries;
+  u32 gaussians;
+  u32 *ids, *places, *rays;
   float* depths;
   GART_KERNEL void operator()(index_t i) const {
     for (u64 k = hits.offsets[i]; k < hits.offsets[i + 1]; ++k) {
       u64 const place = hits.base + k;
-      hit_entry const entry = hits.entries[place];
-      keys[k] = entry.written() ? u64{hits.ids[place] - hits.first} << ray_bits | i : no_key;
-      entries[k] = entry, depths[k] = hits.depths[place] * to_own;
+      ids[k] = hits.entries[place].written() ? hits.ids[place] - hits.first : gaussians;
+      places[k] = static_cast<u32>(k), rays[k] = i;
+      depths[k] = hits.depths[place] * to_own;
     }
   }
 };
@@ -182,7 +189,10 @@ class actor_gradient {
         moved_(exec),
         records_(exec),
         moments_(exec),
-        kept_(exec),
+        ids_(exec),
+        places_(exec),
+        rays_of_hits_(exec),
+        depths_(exec),
         gather_(exec),
         steps_(exec),
         poses_(exec),
@@ -214,14 +224,17 @@ class actor_gradient {
     parallel_for(*exec_, "actors/preprocess", model.count,
                  render_kernels::prepare_gaussians<Response>{model, actor.origin, alpha_min, records_.view()});
     if (gradients.mean) {
-      kept_.ray_bits = std::max(1, static_cast<int>(std::bit_width(n - (n > 0))));
-      kept_.keys.resize(count), kept_.entries.resize(count), kept_.depths.resize(count);
-      kept_.count = count, kept_.sorted = false;
+      for (buffer<u32, E>* const each : {&ids_, &places_, &rays_of_hits_}) each->resize(count);
+      depths_.resize(count), moments_.resize(std::size_t{moment_stride} * model.count);
       parallel_for(*exec_, "actors/pick", n,
-                   actor_kernels::pick_hits{hits, to_own, kept_.ray_bits, u64{model.count} << kept_.ray_bits,
-                                            kept_.keys.data(), kept_.entries.data(), kept_.depths.data()});
-      moments_.resize(std::size_t{moment_stride} * model.count);
-      gather_(*exec_, kept_, moved_, records_, model.sh_degree, gradients, moments_);
+                   actor_kernels::pick_hits{hits, to_own, model.count, ids_.data(), places_.data(),
+                                            rays_of_hits_.data(), depths_.data()});
+      sort_pairs(*exec_, ids_.view(), places_.view(), static_cast<int>(std::bit_width(model.count)));
+      using owner = actor_kernels::ray_of_hit;
+      gather_.sum(*exec_,
+                  sorted_hits<owner>{owner{rays_of_hits_.data()}, ids_.data(), places_.data(), hits.entries + hits.base,
+                                     depths_.data()},
+                  static_cast<index_t>(count), moved_, records_, model.sh_degree, gradients, moments_);
       finish_gradients(*exec_, model, records_, camera{}, 0, moments_, gradients);
     }
     if (!keys && !of_rays_.origins && !of_rays_.directions) return;
@@ -254,7 +267,8 @@ class actor_gradient {
   buffer<differentiated_ray, E> world_, moved_;
   buffer<ray_gaussian, E> records_;
   buffer<float, E> moments_;
-  kept_batch<E> kept_;
+  buffer<u32, E> ids_, places_, rays_of_hits_;
+  buffer<float, E> depths_;
   batch_gather<E, Response> gather_;
   buffer<u32, E> steps_;
   buffer<double, E> poses_;

@@ -8,9 +8,9 @@
 /// Memory: 32 bytes a hit and 8 a ray. Cost: a sort of 12 bytes a hit by 32 bits and those of a ray's number. Errors:
 /// out_of_memory for 2^32 hits and more.
 
-#include <gart/rays/batch_composite.hpp>
-
 #include <gart/algorithm/sort_pairs.hpp>
+#include <gart/rays/batch_composite.hpp>
+#include <gart/rays/batch_lists.hpp>
 
 #include <algorithm>
 #include <bit>
@@ -89,13 +89,13 @@ struct composite_merged {
     u64 k = hits.offsets[i];
     u64 const end = hits.offsets[i + 1];
     for (bool more = true; more && k < end; ++k) {
+      hit const h = hits.at(k);
+      if (h.t > s.far) break;
       u32 const place = hits.places[k];
-      if constexpr (Keep::any) s.kept.place = place;
       float const* const c = hits.colors + std::size_t{3} * place;
-      more = program.on_hit(s, hits.at(k), vec3(c[0], c[1], c[2]));
-      // A hit past the ray's end is none.
-      if constexpr (Keep::any)
-        if (!more && s.kept.place != ~u32{0}) program.keep.drop(place);
+      typename Keep::hit taken;
+      more = program.take(s, h, vec3(c[0], c[1], c[2]), taken);
+      if constexpr (Keep::any) program.keep.write(place, taken);
     }
     if constexpr (Keep::any)
       for (; k < end; ++k) program.keep.drop(hits.places[k]);
@@ -108,22 +108,17 @@ struct composite_merged {
 /// Keeps what the gradient needs of each hit, at the place where it was appended.
 struct keep_by_place {
   static constexpr bool any = true;  ///< some are kept
-  /// Of a ray.
-  struct state {
-    u32 place = 0;  ///< of the hit at hand; all ones: it was kept
-  };
-  hit_entry* entries = nullptr;  ///< [hits], by place
-  float* depths = nullptr;       ///< [hits]: the depth that the ray would have if the hit were opaque
+  using hit = kept_hit;              ///< what is kept of one
+  struct state {};                   ///< of a ray: nothing
+  hit_entry* entries = nullptr;      ///< [hits], by place
+  float* depths = nullptr;           ///< [hits]: the depth that the ray would have if the hit were opaque
 
   /// Keeps a hit.
-  GART_HD GART_INLINE void keep(state& s, index_t, u32, hit_entry const& entry, float depth) const {
-    entries[s.place] = entry, depths[s.place] = depth;
-    s.place = ~u32{0};
-  }
+  GART_HD GART_INLINE void write(u32 place, hit const& h) const { entries[place] = h.entry, depths[place] = h.depth; }
   /// Marks one that was not composited: hit_entry::written is false.
   GART_HD GART_INLINE void drop(u32 place) const { entries[place] = {0, 0, 0, -1}, depths[place] = 0; }
   /// After the last one.
-  GART_HD GART_INLINE void end(state&) const {}
+  GART_HD GART_INLINE void end(index_t, u32) const {}
 };
 
 /// The merged hits and their memory, kept from one batch to the next.

@@ -39,16 +39,18 @@ struct keep_none {
   struct state {};                    ///< nothing
 };
 
+/// What the gradient needs of a hit.
+struct kept_hit {
+  hit_entry entry;  ///< of its colour
+  float depth;      ///< that the ray would have if the hit were opaque
+  u32 id;           ///< the Gaussian
+};
+
 /// Keeps what the gradient needs of each hit, for a sum by Gaussian (rays/batch_gather.hpp).
 template <execution E>
 struct keep_hits {
-  static constexpr bool any = true;  ///< some are kept
-  /// What is kept of one.
-  struct hit {
-    hit_entry entry;  ///< of its colour
-    float depth;      ///< that the ray would have if the hit were opaque
-    u32 id;           ///< the Gaussian
-  };
+  static constexpr bool any = true;             ///< some are kept
+  using hit = kept_hit;                         ///< what is kept of one
   using state = typename run_writer<E>::state;  ///< of a ray
   run_writer<E> runs;                           ///< where they go
   u32* ids = nullptr;                           ///< [places]: Gaussians

@@ -35,6 +35,17 @@ struct kept_batch {
   bool sorted = false;                ///< the order by Gaussian is there
 };
 
+/// The hits of rays in the order of their Gaussians. Owner: owner.ray_of(place) is the ray of a place. Trivially
+/// copyable.
+template <class Owner>
+struct sorted_hits {
+  Owner owner;                         ///< whose the places are
+  u32 const* ids = nullptr;            ///< [count]: Gaussians in order; past the last one: no hit
+  u32 const* places = nullptr;         ///< [count]: where the hits are
+  hit_entry const* entries = nullptr;  ///< by place
+  float const* depths = nullptr;       ///< by place
+};
+
 namespace ray_kernels {
 
 inline constexpr u32 piece_hits = 32;
@@ -52,14 +63,11 @@ struct order_by_ray {
 };
 
 // Rows are laid out as pair_gradient has them, so that sum_pairs adds them up.
-template <class Response>
+template <class Response, class Owner>
 struct sum_piece {
   static constexpr int block_size = 64, min_blocks = 8;
   static constexpr int bands = sh_basis<color_rows::most>::size;
-  run_reader runs;
-  u32 const *ids, *places;
-  hit_entry const* entries;
-  float const* depths;
+  sorted_hits<Owner> hits;
   u32 const *firsts, *ends;
   differentiated_ray const* rays;
   ray_gaussian const* records;
@@ -67,7 +75,7 @@ struct sum_piece {
   quad* rows;
 
   GART_KERNEL void operator()(index_t piece) const {
-    u32 const first = firsts[piece], id = ids[first];
+    u32 const first = firsts[piece], id = hits.ids[first];
     u32 const end = ends[id] - first < piece_hits ? ends[id] : first + piece_hits;
     ray_gaussian const gaussian = records[id];
     float color[3 * bands] = {}, moment[moment_stride] = {};
@@ -90,9 +98,9 @@ struct sum_piece {
  private:
   GART_HD GART_INLINE void add(u32 k, ray_gaussian const& gaussian, float (&color)[3 * bands],
                                float (&moment)[moment_stride]) const {
-    u32 const place = places[k];
-    hit_entry const entry = entries[place];
-    differentiated_ray const from = rays[runs.ray_of(place)];
+    u32 const place = hits.places[k];
+    hit_entry const entry = hits.entries[place];
+    differentiated_ray const from = rays[hits.owner.ray_of(place)];
     vec3 const c = color_gradient_of(entry, from.by_color);
     sh_basis<color_rows::most> const basis(from.direction);
     GART_UNROLL
@@ -101,7 +109,7 @@ struct sum_piece {
       color[3 * b] += basis.y[b] * c.x, color[3 * b + 1] += basis.y[b] * c.y, color[3 * b + 2] += basis.y[b] * c.z;
     }
     ray_peak const r = evaluate(gaussian, from.own());
-    float const by_alpha = alpha_gradient_of<Response>(entry, depths[place], from, gaussian, r);
+    float const by_alpha = alpha_gradient_of<Response>(entry, hits.depths[place], from, gaussian, r);
     moments_of<float> const m =
         hit_moments_with_depth<Response>(gaussian, r, by_alpha, entry.weight() * from.by_depth, true);
     GART_UNROLL
@@ -122,19 +130,28 @@ class batch_gather {
   /// the hits, where they are not.
   void operator()(E& exec, kept_batch<E>& hits, span<differentiated_ray const> rays, span<ray_gaussian const> records,
                   int active_degree, gaussians_view<float> gradients, span<float> moments) {
-    index_t const n = static_cast<index_t>(hits.count), gaussians = gradients.count;
-    if (gaussians == 0) return;
-    sort(exec, hits, n, gaussians);
-    pieces_.cut(exec, "rays/pieces", channel_kernels::id_of_hit{hits.sorted_ids.data()}, n, gaussians,
-                ray_kernels::piece_hits);
+    index_t const n = static_cast<index_t>(hits.count);
+    if (gradients.count == 0) return;
+    sort(exec, hits, n, gradients.count);
+    run_reader const runs = hits.runs.read(hits.offsets.data());
+    sum(exec,
+        sorted_hits<run_reader>{runs, hits.sorted_ids.data(), hits.places.data(), hits.entries.data(),
+                                hits.depths.data()},
+        n, rays, records, active_degree, gradients, moments);
+  }
+
+  /// The same of n hits that are in order.
+  template <class Owner>
+  void sum(E& exec, sorted_hits<Owner> const& hits, index_t n, span<differentiated_ray const> rays,
+           span<ray_gaussian const> records, int active_degree, gaussians_view<float> gradients, span<float> moments) {
+    pieces_.cut(exec, "rays/pieces", channel_kernels::id_of_hit{hits.ids}, n, gradients.count, ray_kernels::piece_hits);
     index_t const pieces = pieces_.count();
     int const sh_floats = gradients.sh_stride();
     rows_.resize(u64{pieces} * static_cast<u64>((sh_floats + 3) / 4 + moment_stride / 4));
-    parallel_for(exec, "rays/gather", pieces,
-                 ray_kernels::sum_piece<Response>{hits.runs.read(hits.offsets.data()), hits.sorted_ids.data(),
-                                                  hits.places.data(), hits.entries.data(), hits.depths.data(),
-                                                  pieces_.firsts(), pieces_.ends(), rays.data(), records.data(),
-                                                  sh_floats, 3 * sh_coefficients(active_degree), rows_.data()});
+    parallel_for(
+        exec, "rays/gather", pieces,
+        ray_kernels::sum_piece<Response, Owner>{hits, pieces_.firsts(), pieces_.ends(), rays.data(), records.data(),
+                                                sh_floats, 3 * sh_coefficients(active_degree), rows_.data()});
     switch (gradients.sh_degree) {
       case 0:
         return add_up<0>(exec, pieces, gradients, moments);
