@@ -18,7 +18,7 @@
 
 namespace gart_cli {
 
-inline constexpr int quick_iterations = 13000;  // of --preset quick
+inline constexpr int quick_iterations = 9500;  // of --preset quick
 
 struct train_arguments {
   std::filesystem::path dataset, out;
