@@ -264,7 +264,7 @@ class grouped_ray {
 // The rays of a launch that are no beams, eight lanes each.
 template <class Response, class Index, ray_program P>
 struct walk_groups {
-  static constexpr int block_size = 32, min_blocks = 20, rays_at_once = block_size / group_lanes;
+  static constexpr int block_size = 64, min_blocks = 10, rays_at_once = block_size / group_lanes;
 
   Index index;
   traced_scene scene;
