@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// The rays of a beam and the Gaussians that it comes across (trace/beam_walk.hpp). Each ray evaluates all of them and
-/// keeps its hits. On a device a lane is a ray, and Gaussians are read once for all; on a host rays fill registers.
+/// keeps its hits. On a device a lane is a ray, and Gaussians are read once for all. On a host rays fill registers.
 
 #include <gart/math/ray_gaussian.hpp>
 #include <gart/trace/lane_hits.hpp>
@@ -46,7 +46,7 @@ __device__ GART_INLINE float pick(float const (&v)[N], int c) {
   return out;
 }
 
-// Of each group of four a ray takes its own hits: few lanes are idle where a candidate is a hit of some rays alone.
+// Of each group of four a ray takes its own hits. So few lanes are idle where a candidate is a hit of some rays alone.
 template <class Response, class Ray, int Waiting>
 __device__ GART_INLINE void meet_staged(beam_ray<Ray, Waiting>& my, lane_hits<Waiting>& memory,
                                         ray_gaussian const* staged, traced_scene const& scene, u32 const* ids, int n) {

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The nodes of a tree that a beam has yet to visit (trace/beam_walk.hpp), in the memory that its lanes share. Some of
-/// the nearest are taken at a time. Where room runs out, only the last one found is taken.
+/// The nodes of a tree that a beam has yet to visit (trace/beam_walk.hpp). They lie in the memory that its lanes share.
+/// Some of the nearest are taken at a time. Where room runs out, only the last one found is taken.
 
 #include <gart/bvh/walk.hpp>
 #include <gart/trace/lane_values.hpp>

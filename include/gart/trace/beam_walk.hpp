@@ -1,14 +1,14 @@
 #pragma once
 /// \file
-/// The walk of a tree by 32 close rays as one beam (bvh/beam.hpp): one source on every policy, a warp on a device. A
-/// node is visited once for all rays, in the order of its entry, the four nearest at a time. Each ray evaluates the
-/// leaves' candidates by itself. A ray's hits wait in a short queue (trace/lane_hits.hpp). They are passed on once they
-/// lie before all nodes that are left. So no ray walks again for more hits than a window holds.
+/// The walk of a tree by 32 close rays as one beam (bvh/beam.hpp). It is one source on every policy. On a device a beam
+/// is a warp. A node is visited once for all rays, in the order of its entry, the four nearest at a time. Each ray
+/// evaluates the leaves' candidates by itself. A ray's hits wait in a short queue (trace/lane_hits.hpp). They are
+/// passed on once they lie before all nodes that are left. So no ray walks again for more hits than a window holds.
 ///
 /// Memory a beam: 24 hits a ray, 224 nodes. A ray that loses hits walks again, strictly after its last, with the others
-/// that did. Where nodes run out of room the walk goes on depth first. If that does not help (only trees of a depth
-/// that no scene has), rays are traced one by one from where they are. Rays that go apart make no beam. walk_alone
-/// takes them one by one, a window of the nearest hits each, and walks again for more.
+/// that did. Where nodes run out of room the walk goes on depth first. If that does not help, rays are traced one by
+/// one from where they are. That takes a tree of a depth that no scene has. Rays that go apart make no beam. They are
+/// taken one by one by walk_alone, a window of the nearest hits each. It walks again for more.
 
 #include <gart/trace/beam_meet.hpp>
 #include <gart/trace/beam_nodes.hpp>
@@ -309,9 +309,9 @@ void trace_alone(E& exec, char const* label, Index const& index, traced_scene co
 
 }  // namespace trace_kernels
 
-/// Feeds `program` the hits of rays 0 to `rays`. Neighbours in `order`, a permutation of them (null: in their own), go
-/// through the tree together where they stay close: where they differ by no more than `widest` (trace/beam_rays.hpp).
-/// `apart`: memory, a word for each beam_lanes of them. alone(apart) traces the others.
+/// Feeds `program` the hits of rays 0 to `rays`. `order` is a permutation of them; null: their own order. Neighbours in
+/// it go through the tree together where they stay close. Rays are close where they differ by no more than `widest`
+/// (trace/beam_rays.hpp). `apart`: memory, a word for each beam_lanes of them. alone(apart) traces the others.
 template <class Response, execution E, class Index, ray_program P, class Alone>
 void trace_beams(E& exec, char const* label, Index const& index, traced_scene const& scene, index_t rays,
                  u32 const* order, buffer<u32, E>& apart, float widest, P const& program, Alone const& alone) {

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// The traverser on gart's own BVH, on every policy: rays of 8 x 4 pixels go through the tree as one beam
-/// (trace/beam_walk.hpp). prepare() fits the tree to the Gaussians of a frame. It builds anew, or refits where their
-/// number has not changed and trace_options.rebuild_every says so.
+/// The traverser on gart's own BVH, on every policy. Rays of 8 x 4 pixels go through the tree as one beam
+/// (trace/beam_walk.hpp). The traverser's prepare() fits the tree to the Gaussians of a frame. It builds anew, or
+/// refits where their number has not changed and trace_options.rebuild_every says so.
 
 #include <gart/camera/pixel_rays.hpp>
 #include <gart/scene/gaussians.hpp>

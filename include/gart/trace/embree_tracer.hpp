@@ -14,8 +14,8 @@
 
 namespace gart {
 
-/// An Embree scene over boxes. intersect calls `leaf` for every box the ray may cross between near and *far, in no
-/// particular order; `leaf` may shorten *far.
+/// An Embree scene over boxes. For every box the ray may cross between near and *far, intersect calls `leaf`. Boxes
+/// come in no particular order; `leaf` may shorten *far.
 class embree_scene {
  public:
   /// An empty scene, on a device of Embree's own.

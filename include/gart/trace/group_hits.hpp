@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// The hits of a ray of eight lanes (trace/group_walk.hpp) that have been found and not yet passed on, in no order.
+/// The hits of a ray of eight lanes (trace/group_walk.hpp) that are found and not yet passed on. They are in no order.
 /// Those that are certain are put in order, by the number of hits before each. Where there is no room the farthest is
 /// lost. From then on, hits that are passed on lie before the nearest hit or node that was lost.
 ///

@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// The walk of a tree by single rays that are few: eight lanes a ray (trace/lane_group.hpp), four rays a warp, step by
-/// step together. One lane a ray would leave a device waiting for the longest of them. A lane tests a child, evaluates
-/// a candidate, or looks up what a hit shows. Nodes are visited once, nearest first. Hits wait until they lie before
-/// all that is left.
+/// The walk of a tree by single rays that are few. Eight lanes take a ray (trace/lane_group.hpp), and a warp takes four
+/// rays, step by step together. One lane a ray would leave a device waiting for the longest of them. A lane tests a
+/// child, evaluates a candidate, or looks up what a hit shows. Nodes are visited once, nearest first. Hits wait until
+/// they lie before all that is left.
 ///
 /// Memory a ray: 80 nodes, 48 hits. The farthest of either are dropped where there is no room. Hits before them are
 /// still passed on, and the ray walks again, strictly after its last. Where that brings no hit, one lane goes on as
@@ -16,8 +16,8 @@ namespace gart { inline namespace GART_ISA { namespace trace_kernels {
 
 static_assert(bvh_width == group_lanes);
 
-// A program may take hits in three steps: lanes look up what several of them show, where it wants to know; all lanes
-// alike take them in turn; and lanes keep what is left of each, a P::taken_hit.
+// A program may take hits in three steps. First, lanes look up what several of them show, where it wants to know. Then
+// all lanes alike take them in turn. Last, lanes keep what is left of each, a P::taken_hit.
 template <class P>
 concept shows_hits = requires(P const& p, typename P::state& s, hit h) {
   p.shade(s, h.id);

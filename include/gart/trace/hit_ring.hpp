@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The hits of a ray that have been found and not yet passed on, sorted, in a ring of fixed capacity. The front is
-/// taken off when it is certain; new ones usually go near the back.
+/// A ray's hits that are found and not yet passed on, sorted, in a ring of fixed capacity. The front is taken off when
+/// it is certain; new ones usually go near the back.
 
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>

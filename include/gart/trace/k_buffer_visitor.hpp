@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Turns candidates into a window of hits: shared by every traverser that proposes Gaussians one at a time and in no
-/// particular order.
+/// Turns candidates into a window of hits. Every traverser that proposes Gaussians one at a time, in no particular
+/// order, shares it.
 
 #include <gart/trace/k_buffer.hpp>
 #include <gart/trace/tracer.hpp>

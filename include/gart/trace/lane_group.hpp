@@ -2,7 +2,7 @@
 /// \file
 /// Eight lanes that go through a tree with one ray (trace/group_walk.hpp), and what they find out together. On a device
 /// they are threads of a warp, four groups to each. All four take every step together, those with nothing to do in it
-/// too: threads of a warp that part would go one group after the other. On a host one thread is all lanes of one group,
+/// too. Threads of a warp that part would go one group after the other. On a host one thread is all lanes of one group,
 /// one after the other.
 
 #include <gart/math/arith.hpp>

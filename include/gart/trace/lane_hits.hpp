@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// The hits of each ray of a beam (trace/beam_walk.hpp) that have been found and not yet passed on, sorted by (t, id).
-/// Each lane has a ring of Capacity in the memory that the lanes share. A full ring loses the farthest. From then on,
-/// hits that are passed on lie before the nearest hit that was lost.
+/// The hits of each ray of a beam (trace/beam_walk.hpp) that are found and not yet passed on. Those of a ray are sorted
+/// by (t, id). Each lane has a ring of Capacity in the memory that the lanes share. A full ring loses the farthest.
+/// From then on, hits that are passed on lie before the nearest hit that was lost.
 
 #include <gart/trace/hit.hpp>
 #include <gart/trace/lane_values.hpp>

@@ -1,15 +1,16 @@
 #pragma once
 /// \file
 /// The traverser on OptiX, for the CUDA policy. OptiX lists the boxes that each ray meets, and math/ray_gaussian.hpp
-/// decides which are hits: those of the BVH tracer, bit for bit. Rays go in chunks: one launch counts their boxes, the
-/// next writes the numbers, and a kernel of gart's composites them. Link gart::optix; this header needs no OptiX.
+/// decides which are hits. They are those of the BVH tracer, bit for bit. Rays go in chunks. One launch counts their
+/// boxes, the next writes the numbers, and a kernel of gart's composites them. Link gart::optix; this header needs no
+/// OptiX.
 ///
 /// The tree is over boxes in the frame, the ellipsoid_box of bvh/box.hpp. Instances of one ellipsoid would be tested in
-/// OptiX's own float arithmetic, whose transform to the ellipsoid's space may lose a ray that grazes a thin one.
+/// OptiX's own float arithmetic. Its transform to the ellipsoid's space may lose a ray that grazes a thin one.
 ///
 /// Memory: 24 bytes a Gaussian and OptiX's tree; 44 bytes a ray and 4 a candidate of a chunk. Waits for the device
-/// once a chunk. Errors: unsupported where the driver has no OptiX, or not that of the build; where a Gaussian or a ray
-/// lies farther from the frame than OptiX's coordinates are used to.
+/// once a chunk. Errors: unsupported where the driver has no OptiX, or not that of the build. The same where a Gaussian
+/// or a ray lies farther from the frame than OptiX's coordinates are used to.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/algorithm/reduce.hpp>

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// The part of a Gaussian's box that lies in a tile (a cell), for the packets of the tile: which of their pixels are in
-/// the box. Worked out once a (tile, Gaussian) pair for all packets of the tile. A packet program derives its own data
-/// of the pair from it.
+/// The part of a Gaussian's box that lies in a tile (a cell), for the packets of the tile. It says which of their
+/// pixels are in the box. It is worked out once a (tile, Gaussian) pair for all packets of the tile. A packet program
+/// derives its own data of the pair from it.
 
 #include <gart/tiles/footprint_slots.hpp>
 #include <gart/trace/packet_block.hpp>

@@ -3,10 +3,10 @@
 /// The walk of tile lists on a host: rays in packets, a lane a pixel (math/lanes.hpp). It does the same as walk_tiles
 /// (trace/tile_tracer.hpp), hit by hit and bit by bit. A candidate is evaluated for all rays of a packet at once, and
 /// its hits stay together. They wait in a list of groups, each one Gaussian's hits with some of the rays. The list's
-/// order sorts the hits of each ray by (t, id). Where rays meet two Gaussians in opposite orders no one place suits all
-/// hits of a candidate, and it takes two groups.
+/// order sorts the hits of each ray by (t, id). Where rays meet two Gaussians in opposite orders, no one place suits
+/// all hits of a candidate. The candidate then takes two groups.
 ///
-/// A packet that has more hits waiting than there are groups for says so, and its rays are traced one by one.
+/// A packet may have more hits waiting than there are groups for. It says so, and its rays are traced one by one.
 
 #include <gart/camera/ray_depth.hpp>
 #include <gart/math/ray_gaussian.hpp>
@@ -97,7 +97,7 @@ class packet_walk {
   }
 
   // The hits of the batch's n candidates. All are evaluated before the first is put in its place. The next evaluation
-  // hides the latency of this one, and the place of a hit is a branch that is predicted badly.
+  // hides the latency of this one. The place of a hit is a branch that is predicted badly.
   template <class State>
   GART_INLINE bool take(P const& program, traced_scene const& scene, State const& state, vec3_of<lanes> const& d,
                         int n) {
@@ -123,7 +123,7 @@ class packet_walk {
   }
 
   // Hits behind all others of their rays stand last; the rest go forward from there. A hit may stand behind the last
-  // group that it must follow and before the first that must follow it; rays that share a gap share a group.
+  // group that it must follow and before the first that must follow it. Rays that share a gap share a group.
   GART_INLINE bool insert(hits const& h) {
     lane_mask settled = h.rays & (h.t > farthest_), left = h.rays & ~settled;
     farthest_ = select(settled, h.t, farthest_);
@@ -165,7 +165,7 @@ class packet_walk {
     lane_mask stay = lanes_of(0);
     u16 last = sentinel, at = pool_[sentinel].farther;  // of those that stay; the next to look at
     for (;;) {
-      // A few groups at a time, shaded side by side: the latency of one colour's sum is hidden by the others.
+      // A few groups at a time are shaded side by side. The others hide the latency of one colour's sum.
       group const* ready[shaded_at_once];
       lane_mask now[shaded_at_once];
       typename P::shaded shaded[shaded_at_once];

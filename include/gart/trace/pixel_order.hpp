@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// The order in which pixels are traced: blocks of 8 x 4, so that the threads of a warp, and a core's cache, see
+/// The order in which pixels are traced: blocks of 8 x 4. So the threads of a warp, and a core's cache, see
 /// neighbouring rays. Launches are padded to whole blocks.
 
 #include <gart/core/isa.hpp>

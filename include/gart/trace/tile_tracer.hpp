@@ -1,18 +1,18 @@
 #pragma once
 /// \file
 /// The traverser on tile lists, for the rays of a camera's pixels: no tree. A tile's list holds every Gaussian that any
-/// of its pixels can hit, sorted by its nearest possible hit there (tiles/tile_order.hpp). A pixel walks the list and
-/// keeps the hits found in a small window sorted by (t, id). The first of them is next once it lies nearer than all
-/// that is left of the list can. When the window overflows it keeps the nearest. The ray resumes strictly after its
-/// last hit from the first candidate whose hit was dropped: exact for any number of hits. The hits are those of the
-/// other tracers, bit for bit.
+/// of its pixels can hit. It is sorted by the nearest possible hit of each there (tiles/tile_order.hpp). A pixel walks
+/// the list and keeps the hits found in a small window sorted by (t, id). The first of them is next once it lies nearer
+/// than all that is left of the list can. When the window overflows it keeps the nearest. The ray resumes strictly
+/// after its last hit, from the first candidate whose hit was dropped. So the walk is exact for any number of hits. The
+/// hits are those of the other tracers, bit for bit.
 ///
-/// Rays that meet the same Gaussians are walked together where their program can: packets of lanes on a host
-/// (trace/packet_walk.hpp), warps on a device (trace/warp_walk.hpp, tiles of a multiple of 8). Other programs' rays are
-/// walked one by one.
+/// Rays that meet the same Gaussians are walked together where their program can. On a host they go in packets of lanes
+/// (trace/packet_walk.hpp). On a device they go in warps (trace/warp_walk.hpp), for tiles of a multiple of 8. Other
+/// programs' rays are walked one by one.
 ///
-/// It traces pixel programs (trace/ray_program.hpp). Cost: the footprints, one sort of the (primitive, tile) pairs, and
-/// a walk of each tile's list up to where its rays end.
+/// It traces pixel programs (trace/ray_program.hpp). Cost: the footprints and one sort of the (primitive, tile) pairs.
+/// Then comes a walk of each tile's list up to where its rays end.
 
 #include <gart/scene/gaussians.hpp>
 #include <gart/tiles/tile_map.hpp>
@@ -102,7 +102,8 @@ struct walk_tiles {
 };
 
 #if !defined(__CUDACC__)
-/// On a host, programs with packets: a tile's packets one after another; rays of a packet that runs over one by one.
+/// On a host, for programs with packets: walks a tile's packets one after another. Rays of a packet that runs over are
+/// walked one by one.
 template <class Response, int Size, pixel_program P>
 struct walk_tile_packets {
   using packets = decltype(packets_of(std::declval<P const&>()));

@@ -2,10 +2,10 @@
 /// \file
 /// A tracer is prepared for the Gaussians of one view. It feeds a ray program the hits of each of its rays in order,
 /// until the program has had enough. Its structure yields candidates only. Which are hits, their t and their alpha come
-/// from math/ray_gaussian.hpp, so all tracers give the same hits in the same order, bit for bit.
+/// from math/ray_gaussian.hpp. So all tracers give the same hits in the same order, bit for bit.
 ///
-/// A tracer derives from tracer_base and is held to the concept where it is defined. render/frame.hpp has one, and
-/// calls it in the right order.
+/// A tracer derives from tracer_base and is held to the concept where it is defined. A frame (render/frame.hpp) has
+/// one, and calls it in the right order.
 
 #include <gart/bvh/box.hpp>
 #include <gart/camera/pixel_rays.hpp>
@@ -32,7 +32,8 @@ struct traced_scene {
   float near = 0;     ///< hits lie at t > near
 };
 
-/// Where ray i begins: at its program's near(i), where it has one, which is at least the scene's; else at the scene's.
+/// Where ray i begins: at its program's near(i), where it has one, else at the scene's near. A program's near(i) is at
+/// least the scene's.
 template <class P>
 GART_HD GART_INLINE float start_of_ray(traced_scene const& scene, P const& program, index_t i) {
   if constexpr (requires { program.near(i); })

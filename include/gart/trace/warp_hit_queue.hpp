@@ -1,10 +1,10 @@
 #pragma once
 /// \file
 /// The pending hits of one ray of a warp (trace/warp_walk.hpp), in the order (t, id). The latest 15 lie in a window in
-/// shared memory, each lane in a bank of its own, their order a register of 4-bit numbers. A full window is spilled,
-/// all but its first hit, as a run, in order, to its own memory. For each run the next hit's t is in a register. The
-/// next hit of all is the window's first or that of a run. So a hit is spilled once at most, and the order of others is
-/// never made anew for it.
+/// shared memory, where each lane has a bank of its own. Their order is a register of 4-bit numbers. A full window is
+/// spilled, all but its first hit, as a run, in order, to its own memory. For each run the next hit's t is in a
+/// register. The next hit of all is the window's first or that of a run. So a hit is spilled once at most, and the
+/// order of others is never made anew for it.
 ///
 /// Where all runs are taken a hit is lost. Hits passed on from then on lie before the nearest lost one.
 /// Memory: 24 bytes for each of 196 hits a lane. Device only.
@@ -26,7 +26,7 @@ struct waiting_hit {
   u32 key;     ///< a hit's place where hits have places (trace/warp_program.hpp), else its Gaussian's entry in the list
 };
 
-/// Order of hits at one t: places of a pixel's hits have the order of their ids; entries are asked for them.
+/// The order of hits at one t. Places of a pixel's hits are in the order of their ids. Entries are asked for their ids.
 struct place_order {
   /// By number.
   GART_HD GART_INLINE bool operator()(u32 a, u32 b) const { return a < b; }
@@ -87,7 +87,7 @@ class warp_hit_queue {
   __device__ GART_INLINE bool lost() const { return lost_t_ < infinity; }
   __device__ GART_INLINE float lost_t() const { return lost_t_; }  ///< infinity: none
 
-  /// For a window that is full, and for one that soon will be: lanes that spill do so together, without divergence.
+  /// Spills a window that is full, and one that soon will be. So lanes spill together, without divergence.
   __device__ GART_INLINE void make_room() {
     if (count_ < window - 3) return;
     int const to = free_run();
@@ -135,7 +135,8 @@ class warp_hit_queue {
   // The slot of the window's hit that has k behind it; without one no_slot.
   __device__ GART_INLINE int slot_from_back(int k) const { return static_cast<int>(order_ >> (4 * k)) & 15; }
 
-  // Where some hit was lost or the window is full: whether there is a place for this one, nearer than all lost hits.
+  // Whether there is a place for this hit, where one was lost or the window is full. It must lie nearer than all lost
+  // hits.
   __device__ GART_INLINE bool has_place(waiting_hit const& h) {
     if (lost() && !nearer(h.t, h.key, lost_t_, lost_key_)) return false;
     if (!full()) return true;

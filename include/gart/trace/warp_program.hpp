@@ -1,7 +1,8 @@
 #pragma once
 /// \file
-/// A pixel program whose rays can meet a Gaussian together (trace/warp_walk.hpp). It asks for what a hit shows where
-/// the hit is found, from a row of floats that the whole warp has read. It composites the hit in its turn.
+/// A pixel program whose rays can meet a Gaussian together (trace/warp_walk.hpp). It computes what a hit shows where
+/// the hit is found. What it needs for that is in a row of floats that the whole warp has read. It composites the hit
+/// in its turn.
 
 #include <gart/math/glm.hpp>
 #include <gart/tiles/footprint_slots.hpp>

@@ -1,14 +1,14 @@
 #pragma once
 /// \file
-/// The walk of tile lists on a device: a warp takes a block of 8 x 4 pixels of a tile, a lane a ray. It does the same
+/// The walk of tile lists on a device. A warp takes a block of 8 x 4 pixels of a tile, a lane a ray. It does the same
 /// as walk_tiles (trace/tile_tracer.hpp), hit by hit and bit by bit. All rays of the warp meet a candidate together. So
 /// one vote leaves out candidates that miss the block. The others come through shared memory, read ahead while earlier
-/// ones are evaluated. Of each group of four a ray then takes its own hits, one after the other, and computes what they
+/// ones are evaluated. Of each group of four a ray then takes its own hits, one after the other. It computes what they
 /// show. So few lanes idle where a candidate is a hit of some rays alone. A ray's pending hits are in a queue
-/// (trace/warp_hit_queue.hpp). Hits are passed on when the window of some ray's queue is full: many rays then have some
-/// to pass on, and do it together. Where a queue loses a hit the ray passes on the hits before it, and walks the list
-/// again, strictly after its last hit. The queues take 4.7 KB of device memory for each ray that the device holds at a
-/// time: 298 MB on 132 multiprocessors.
+/// (trace/warp_hit_queue.hpp). Hits are passed on when the window of some ray's queue is full. Many rays then have some
+/// to pass on, and do it together. Where a queue loses a hit, the ray passes on the hits before it. Then it walks the
+/// list again, strictly after its last hit. The queues take 4.7 KB of device memory for each ray that the device holds
+/// at a time: 298 MB on 132 multiprocessors.
 
 #include <gart/camera/ray_depth.hpp>
 #include <gart/math/ray_gaussian.hpp>
@@ -78,7 +78,7 @@ class walk_tile_warps {
     warp_scratch warp[warps];  ///< of each
   };
 
-  /// As many teams as the device holds: their warps take parts of tiles, those of the longest lists first, until there
+  /// As many teams as the device holds. Their warps take parts of tiles, those of the longest lists first, until there
   /// are no more.
   template <class Team>
   __device__ void operator()(Team const& team) const {
@@ -189,8 +189,8 @@ class walk_tile_warps {
       return more;
     }
 
-    // The first floats of a word to shared memory, and zero for the others: the active bands may end within one. What
-    // __pipeline_memcpy_async does, whose zeros are a number known to the compiler.
+    // Copies the first floats of a word to shared memory, and zero for the others. The active bands may end within a
+    // word. Unlike for __pipeline_memcpy_async, the compiler need not know the number of zeros.
     __device__ GART_INLINE static void copy_part(quad* to, quad const* from, int floats) {
       asm volatile(
           "cp.async.cg.shared.global [%0], [%1], 16, %2;" ::"r"(static_cast<u32>(__cvta_generic_to_shared(to))),
@@ -256,7 +256,7 @@ class walk_tile_warps {
       return true;
     }
 
-    // The same where a ray may have no room: hits before the first remaining one are passed on, to make some.
+    // The same where a ray may have no room. Hits before the first remaining one are passed on, to make some.
     __device__ GART_INLINE bool add_crowded(candidate const (&from)[group], float const (&t)[group],
                                             float const (&d2)[group], u32 found, int first) {
       bool tried = false;
