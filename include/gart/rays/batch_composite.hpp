@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// The forward pass of a batch: front-to-back compositing of the hits of a ray, by the arithmetic of an image's pixels
-/// (render/composite.hpp), with the distances and Gaussians that a sensor asks for besides. One program serves all SH
-/// degrees: coefficients are read in their stride.
+/// The forward pass of a batch: front-to-back compositing of the hits of a ray. Its arithmetic is that of an image's
+/// pixels (render/composite.hpp). It also finds the distances and Gaussians that a sensor asks for. One program serves
+/// all SH degrees: coefficients are read in their stride.
 
 #include <gart/backward/hit_slot.hpp>
 #include <gart/channels/hit_table.hpp>

@@ -1,12 +1,12 @@
 #pragma once
 /// \file
-/// The backward pass of a batch by primitive: the hits that the forward pass kept (keep_hits) are put in the order of
-/// the rays, sorted by Gaussian, cut into pieces of one Gaussian each, and summed: a lane takes a piece, then the
-/// pieces of a Gaussian are added up in order. No ray is traced, nothing is atomic, and the order of every sum follows
-/// from the hits alone: the same bits in every run.
+/// The backward pass of a batch by primitive. The hits that the forward pass kept (keep_hits) are put in the order of
+/// the rays. Then they are sorted by Gaussian, cut into pieces of one Gaussian each, and summed. A lane takes a piece,
+/// then the pieces of a Gaussian are added up in order. No ray is traced, and nothing is atomic. The order of every sum
+/// follows from the hits alone: the same bits in every run.
 ///
-/// Cost: a sort of 8 bytes a hit by as many bits as Gaussians need, one read of 20 bytes a hit and 48 of its ray, and
-/// 240 bytes a piece of 32 hits at SH degree 3. The host reads how many pieces there are.
+/// Cost: a sort of 8 bytes a hit by as many bits as Gaussians need. Then one read of 20 bytes a hit and 48 of its ray.
+/// Also 240 bytes a piece of 32 hits at SH degree 3. The host reads how many pieces there are.
 
 #include <gart/algorithm/sort_pairs.hpp>
 #include <gart/backward/gather.hpp>

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
 /// The backward pass of a batch: what each ray brings to it, and the form that traces rays again. A ray adds each hit's
-/// gradient to its Gaussian, atomically, and keeps the sums that are its own: dL/d its origin and its direction, which
-/// colours turn with. Formulas are those of math/hit_gradient.hpp and math/sh_turn.hpp.
+/// gradient to its Gaussian, atomically, and keeps the sums that are its own. These are dL/d its origin and its
+/// direction, which colours turn with. Formulas are those of math/hit_gradient.hpp and math/sh_turn.hpp.
 
 #include <gart/backward/hit_slot.hpp>
 #include <gart/math/hit_gradient.hpp>
@@ -40,7 +40,7 @@ GART_HD GART_INLINE float alpha_gradient_of(hit_entry const& entry, float depth,
   return alpha_gradient(opaque_g, from.total, estimated_hit_alpha<Response>(gaussian, r.d2));
 }
 
-/// dL/dw of a small turn of a ray by the colour of Gaussian `id` that it sees, whose gradient is g.
+/// dL/dw of a small turn of a ray by the colour of Gaussian `id` that it sees. The colour's gradient is g.
 GART_HD GART_INLINE vec3 turn_by_color(color_rows const& colors, sh_basis<color_rows::most> const& basis, u32 id,
                                        vec3 const& g) {
   constexpr int bands = sh_basis<color_rows::most>::size;

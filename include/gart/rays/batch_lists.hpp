@@ -1,8 +1,8 @@
 #pragma once
 /// \file
 /// The hits of a batch as lists (channels/hit_table.hpp). Where a list was made before, there is room for about as many
-/// hits: rays write them as they find them (rays/hit_runs.hpp), and then each goes to its place in the table. Else one
-/// walk counts and a second one writes.
+/// hits. Rays write them as they find them (rays/hit_runs.hpp). Then each goes to its place in the table. Else one walk
+/// counts and a second one writes.
 ///
 /// Memory, beside the table: 16 bytes a hit, and 16 places at a time a ray.
 

@@ -45,7 +45,7 @@ struct batch_rays {
     }
     return out;
   }
-  /// From dL/d the unit direction d of ray i to dL/d the direction as it was given: what stands along it changes its
+  /// From dL/d the unit direction d of ray i to dL/d the direction as it was given. What stands along it changes its
   /// length alone.
   GART_HD GART_INLINE vec3 gradient_of_given(index_t i, vec3 const& d, vec3 by) const {
     by -= d * glm::dot(by, d);

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// Whether Gaussians have changed, by one number of all their parameters. Arrays that somebody else writes to tell
-/// nobody when they do: a sum over them does, and costs one read where a tree over them costs tens.
+/// nobody when they change. A sum over them does. It costs one read where a tree over them costs tens.
 
 #include <gart/algorithm/reduce.hpp>
 #include <gart/exec/buffer.hpp>

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Places for the hits of rays before anybody knows how many they are, so that one walk finds hits and writes them. A
-/// ray takes a run of places at a time, and says whose it is and where in the ray it begins. Counts say afterwards
+/// Places for the hits of rays before anybody knows how many they are. So one walk finds hits and writes them. A ray
+/// takes a run of places at a time. It says whose the run is and where in the ray it begins. Counts say afterwards
 /// where in the order of the rays each hit belongs. Where there are more hits than places, the rest is counted, not
 /// written.
 ///

@@ -1,12 +1,12 @@
 #pragma once
 /// \file
-/// The rays of lidars as a batch: a pattern of directions and times in the sensor's axes, and where the sensor is and
-/// how it moves while it looks about. Patterns need be neither separable nor of one azimuth seam.
+/// The rays of lidars as a batch. A pattern has directions and times in the sensor's axes. A pose says where the sensor
+/// is and how it moves while it looks about. Patterns need be neither separable nor of one azimuth seam.
 ///
 ///   ray_list const rays = rays_of(spinning_lidar(elevations, 1024), {.rotation = axes, .position = at});
 ///   traced_rays const seen = renderer->trace(rays.batch(), {});      // seen.median: ranges, a row of 1024 a beam
 ///
-/// Axes of a sensor: x forward, y left, z up; angles in radians, azimuths from x to y, elevations up from there.
+/// Axes of a sensor: x forward, y left, z up. Angles are in radians, azimuths from x to y, elevations up from there.
 /// Arithmetic is in double, and a ray's origin relative to the sensor's position in the middle of the sweep.
 /// Errors: invalid_argument for counts that disagree or numbers that are not finite.
 
@@ -35,8 +35,8 @@ struct lidar_pattern {
 };
 
 /// A column of beams that turns: [beams][columns], time going with the column. `revolution` is the way of the azimuth
-/// from the first column to past the last, -2 pi being once around clockwise. azimuths: of each beam, relative to the
-/// column's; empty: none.
+/// from the first column to past the last. It is -2 pi for once around clockwise. `azimuths`: of each beam, relative to
+/// the column's; empty: none.
 inline lidar_pattern spinning_lidar(std::vector<float> const& elevations, int columns,
                                     double revolution = -6.283185307179586, double first_azimuth = 0,
                                     std::vector<float> const& azimuths = {}) {

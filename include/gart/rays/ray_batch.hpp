@@ -2,13 +2,14 @@
 /// \file
 /// Rays that no image has: a batch of them, what they see, and the gradients of that. Lidars, secondary rays, queries.
 ///
-/// Rays begin at origins relative to a frame, a point of the world in double, as the rays of a view do to its position:
-/// a batch of a view's rays, in the frame of its position, gives the view's numbers, bit for bit. A direction of unit
-/// length, to 1e-5, is taken as it stands; another is made one. Distances are in world units along the ray.
+/// Rays begin at origins relative to a frame, a point of the world in double. The rays of a view begin relative to its
+/// position likewise. So a batch of a view's rays, in the frame of its position, gives the view's numbers, bit for bit.
+/// A direction of unit length, to 1e-5, is taken as it stands; another is made one. Distances are in world units along
+/// the ray.
 ///
 /// What is a span lies where the call says: in memory of the policy, or in host memory.
-/// Errors: invalid_argument for spans whose sizes disagree, by field, and for a ray that is none, by number: a number
-/// that is not finite, a direction of no length, an end before options.near.
+/// Errors: invalid_argument for spans whose sizes disagree, by field, and for a ray that is none, by number. Such a ray
+/// has a number that is not finite, a direction of no length, or an end before options.near.
 
 #include <gart/channels/hit_lists.hpp>
 #include <gart/channels/targets.hpp>

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// An order of a batch's rays in which neighbours stay close together, for walks that take them as beams
-/// (trace/beam_walk.hpp): along a Hilbert curve of directions, on an octahedron laid flat, in which an octree of
-/// origins is woven in, a level of each in turn. The batch's own arrays stay as they are.
+/// An order of a batch's rays in which neighbours stay close, for walks that take them as beams (trace/beam_walk.hpp).
+/// It goes along a Hilbert curve of directions, on an octahedron laid flat. An octree of origins is woven into it, a
+/// level of each in turn. The batch's own arrays stay as they are.
 ///
 /// Cost: one sort of 12 bytes a ray, by 24 bits where all rays begin at the frame, else by 50.
 

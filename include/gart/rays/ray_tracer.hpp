@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Any rays through a model, on every policy: what they see, their hits, and the gradients of both to the Gaussians and
-/// to the rays.
+/// Any rays through a model, on every policy: what they see and their hits. The gradients of both go to the Gaussians
+/// and to the rays.
 ///
 ///   ray_tracer<E> tracer(exec);
 ///   tracer.set_scene(scene.view(), sh_degree);                          // again where the Gaussians may have changed
@@ -11,17 +11,17 @@
 ///
 /// One tree serves all batches until the Gaussians change (rays/world_index.hpp), and several tracers
 /// (rays/shared_index.hpp has the rule of threads). Hits, their order and what they add
-/// up to are those of an image's pixels. options.antialias must be 0: rays have no pixels to filter by; options.rows is
-/// not looked at.
+/// up to are those of an image's pixels. `options.antialias` must be 0, since rays have no pixels to filter by.
+/// `options.rows` is not looked at.
 ///
 /// Features (channels/) are shown and differentiated over hit lists: a second trace, and 16 or 40 bytes a hit.
 ///
 /// Memory beside the tree: 64 bytes a Gaussian, with gradients 48 more; 12 bytes a ray, and 32 that a context holds.
-/// Hits that are kept by gradient_form::primitive take 32 each, and 16 places at a time a ray. Cost: on the first batch
-/// after a change the tree; on a batch in another frame than the last one launch over the Gaussians; then the trace.
-/// Checks wait for the policy once a batch. Errors: invalid_argument as rays/ray_batch.hpp has it, for options that
-/// nothing can be traced by, for a context of Gaussians that have changed; out_of_memory for more than 2^32 hits kept
-/// at a time.
+/// Hits that are kept by gradient_form::primitive take 32 each, and 16 places at a time a ray. Cost: the tree on the
+/// first batch after a change. A batch in another frame than the last one's costs one launch over the Gaussians. Then
+/// comes the trace. Checks wait for the policy once a batch. Errors: invalid_argument as rays/ray_batch.hpp has it, and
+/// for options that nothing can be traced by. The same for a context of Gaussians that have changed. Also out_of_memory
+/// for more than 2^32 hits kept at a time.
 
 #include <gart/backward/finish.hpp>
 #include <gart/channels/passes.hpp>
@@ -143,9 +143,8 @@ class ray_tracer {
     return context;
   }
 
-  /// From dL/d what the rays saw to dL/d the Gaussians, which are overwritten, of at least the degree that is
-  /// evaluated, and to dL/d the rays. Gradients of Gaussians are left out where there are no arrays. May be called
-  /// again.
+  /// From dL/d what the rays saw to dL/d the Gaussians and dL/d the rays. Gradients of Gaussians are overwritten, and
+  /// are of at least the degree that is evaluated. They are left out where there are no arrays. May be called again.
   void backward(batch_context<E>& context, output_gradients const& by, gaussians_view<float> gradients,
                 ray_gradient_targets const& of_rays = {}, channel_gradient_targets const& of_channels = {}) {
     stage_scope stage(*exec_, "rays backward");

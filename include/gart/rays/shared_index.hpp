@@ -5,10 +5,10 @@
 ///   shared_index<E> const tree(exec, scene.view(), options.alpha_min, frame);
 ///   one.share(&tree), other.share(&tree);                    // ray_tracers, each with a policy and a thread
 ///
-/// The rule of threads: a policy, and so a tracer, a context or a renderer, is used by one thread at a time. Arrays of
-/// Gaussians and a shared tree are only read, by as many as like. A tracer whose Gaussians or alpha_min are others than
-/// the tree's takes a tree of its own, so that a stale one changes no hit. What shares it waits for its policy before
-/// the tree goes.
+/// The rule of threads: one thread at a time uses a policy. The same holds for a tracer, a context or a renderer.
+/// Arrays of Gaussians and a shared tree are only read, by as many as like. A tracer whose Gaussians or alpha_min are
+/// others than the tree's takes a tree of its own. So a stale tree changes no hit. What shares it waits for its policy
+/// before the tree goes.
 ///
 /// Cost: as rays/world_index.hpp; the constructor waits for its policy.
 

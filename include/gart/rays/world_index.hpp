@@ -1,11 +1,13 @@
 #pragma once
 /// \file
-/// A tree over a model in a frame of the world, that rays from anywhere are traced by: built once, refitted or built
-/// again where the Gaussians change. A batch has a frame of its own (rays/ray_batch.hpp), that its hits are decided in,
-/// so that the tree only proposes candidates, and its frame changes no bit. What that costs is width: a ray whose frame
-/// lies far from the tree's is tested with boxes that are wider by the roundings of the way between them.
+/// A tree over a model in a frame of the world, that rays from anywhere are traced by. It is built once, and refitted
+/// or built again where the Gaussians change. A batch has a frame of its own (rays/ray_batch.hpp), that its hits are
+/// decided in. So the tree only proposes candidates, and its frame changes no bit. What that costs is width. A ray
+/// whose frame lies far from the tree's is tested with wider boxes. They are wider by the roundings of the way between
+/// the two frames.
 ///
-/// Cost: as bvh_tracer's, once a model in place of once a view: on hosts about 0.15 s a million Gaussians and core.
+/// Cost: as bvh_tracer's, once a model in place of once a view. On hosts it is about 0.15 s a million Gaussians and
+/// core.
 
 #include <gart/rays/ray_order.hpp>
 #include <gart/trace/bvh_tracer.hpp>
@@ -18,8 +20,9 @@ struct world_view {
   bvh_view tree;     ///< over the ellipsoids' boxes, in the index's frame
   vec3d shift{0.0};  ///< the rays' frame, relative to the index's
 
-  /// A ray in the tree's frame. Its hit lies where float arithmetic in the rays' frame puts it: 32 roundings of what it
-  /// is computed from, as ellipsoid_box has them, and of how the ray comes to this frame.
+  /// A ray in the tree's frame. Its hit lies where float arithmetic in the rays' frame puts it. That is off by up to 32
+  /// roundings of what the hit is computed from, as ellipsoid_box has them. It is off by as many of how the ray comes
+  /// to this frame.
   GART_HD GART_INLINE placed_ray place(ray const& r) const {
     vec3 const o = r.origin;
     placed_ray out = gart::place(
@@ -74,8 +77,8 @@ class world_index {
   float alpha_min_ = 0;
 };
 
-/// Feeds `program` the hits of rays 0 to `rays`. `scene` has the Gaussians in the frame of the rays, which are the
-/// program's: of type `ray`, with an end far(i).
+/// Feeds `program` the hits of rays 0 to `rays`. `scene` has the Gaussians in the frame of the rays. The rays are the
+/// program's, of type `ray`, with an end far(i).
 template <class Response, execution E, ray_program P>
 void trace_batch(E& exec, char const* label, world_view const& index, traced_scene const& scene, index_t rays,
                  ray_order<E>& order, P const& program) {
