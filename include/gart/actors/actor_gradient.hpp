@@ -1,10 +1,10 @@
 #pragma once
 /// \file
-/// The backward pass of rays among actors. In an actor's frame its hits are those of a batch whose rays are moved: what
-/// they say of its model is summed as a batch's (rays/batch_gather.hpp), and of each ray's origin and direction here;
-/// the ray and the pose take their share by the equations of actors/moved_rays.hpp, and the keys of a track theirs of
-/// the pose by track_step::pull_back_to_end. A distance t of the world is t / s there, and its gradient s times that.
-/// Nothing is atomic: the same bits in every run.
+/// The backward pass of rays among actors. In an actor's frame its hits are those of a batch whose rays are moved. What
+/// they say of its model is summed as a batch's (rays/batch_gather.hpp). What they say of each ray's origin and
+/// direction is summed here. The ray and the pose take their share by the equations of actors/moved_rays.hpp. The keys
+/// of a track take theirs of the pose by track_step::pull_back_to_end. A distance t of the world is t / s there, and
+/// its gradient s times that. Nothing is atomic: the same bits in every run.
 ///
 /// Memory: 16 bytes a hit, 100 a ray for the keys of a track, and 96 a piece of 64 rays.
 
@@ -52,7 +52,7 @@ struct ray_of_hit {
   GART_HD u32 ray_of(u32 place) const { return rays[place]; }
 };
 
-// An actor's hits as those of a batch; the id of one that was not composited is past the last Gaussian.
+// An actor's hits as those of a batch. The id of one that was not composited is past the last Gaussian.
 struct pick_hits {
   actor_hits_view hits;
   float to_own;  // 1 / s
@@ -213,8 +213,8 @@ class actor_gradient {
       if (each) exec_->zero(each, sizeof(float) * 3 * n);
   }
 
-  /// An actor whose model's hits are `count`. To its model's gradients, overwritten, where they are wanted; to its
-  /// keys', [keys][6], where they are; and to those of the rays.
+  /// An actor whose model's hits are `count`. To its model's gradients, overwritten, where they are wanted. To its
+  /// keys', [keys][6], where they are, and to those of the rays.
   void add(actor_view const& actor, actor_hits_view const& hits, u64 count, gaussians_view<float const> model,
            float alpha_min, gaussians_view<float> gradients, float* keys, u32 key_count) {
     index_t const n = rays_.count();

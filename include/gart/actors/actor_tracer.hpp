@@ -9,15 +9,15 @@
 ///   tracer.backward(context, {by_color, by_depth}, {by_models, by_keys}, {.directions = by_direction});
 ///
 /// Each model has a tree in its own frame, built once, whatever moves. A batch is moved into each actor's frame
-/// (actors/moved_rays.hpp) and its hits there are listed (rays/ray_tracer.hpp), merged in order
+/// (actors/moved_rays.hpp) and its hits there are listed (rays/ray_tracer.hpp). The lists are merged in order
 /// (actors/merged_hits.hpp), and composited as a batch's. Gaussians are numbered actor after actor. Actors that all
 /// stand at the world's origin, in its axes, give the bits of one scene of all Gaussians.
 ///
-/// Memory beside the trees: 32 bytes a hit of all actors, 44 a ray; a context has 24 a hit, 20 a ray and 8 a ray and
-/// actor. Cost: what a batch costs, two traces of lists, for each actor, whether rays meet it or not; the sort of
-/// the hits; backward the moved rays again and, by model, the sort and sums of gradient_form::primitive.
-/// Features are not shown here. Errors: invalid_argument as rays/ray_batch.hpp and instances/instance_track.hpp have
-/// it, and for times that a track does not cover.
+/// Memory beside the trees: 32 bytes a hit of all actors, 44 a ray. A context has 24 a hit, 20 a ray and 8 a ray and
+/// actor. Cost: what a batch costs, two traces of lists, for each actor, whether rays meet it or not. Then the sort of
+/// the hits. Backward costs the moved rays again and, by model, the sort and sums of gradient_form::primitive. Features
+/// are not shown here. Errors: invalid_argument as rays/ray_batch.hpp and instances/instance_track.hpp have it, and for
+/// times that a track does not cover.
 
 #include <gart/actors/actor_gradient.hpp>
 #include <gart/actors/merged_hits.hpp>
@@ -31,8 +31,8 @@ namespace gart { inline namespace GART_ISA {
 /// Where gradients go, in memory of the policy; empty or null where they are not wanted. All are overwritten.
 struct actor_gradients {
   span<gaussians_view<float> const> models = {};  ///< of each, of its size and degree: summed over its actors
-  /// [keys of all tracks][6], track after track: dL/d position in world units, then dL/dw, a small turn w of the
-  /// key's pose about its position.
+  /// [keys of all tracks][6], track after track: dL/d position in world units, then dL/dw. Here w is a small turn of
+  /// the key's pose about its position.
   float* keys = nullptr;
 };
 

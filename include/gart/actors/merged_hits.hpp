@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// The hits of rays with several actors, each traced apart, in one order: by ray and t, ties by the number of the
-/// Gaussian among all. Lists of actors are appended one after the other, with the colour that each ray sees in the
-/// actor's frame, then sorted; stable, so that ties keep the order of the actors. What ends a ray among all hits ends
-/// it no later than among one actor's: lists that options end hold all that is composited.
+/// The hits of rays with several actors, each traced apart, in one order. That is by ray and t, ties by the number of
+/// the Gaussian among all. Lists of actors are appended one after the other, with the colour that each ray sees in the
+/// actor's frame. Then they are sorted. The sort is stable, so that ties keep the order of the actors. What ends a ray
+/// among all hits ends it no later than among one actor's. So lists that options end hold all that is composited.
 ///
 /// Memory: 32 bytes a hit and 8 a ray. Cost: a sort of 12 bytes a hit by 32 bits and those of a ray's number. Errors:
 /// out_of_memory for 2^32 hits and more.

@@ -1,12 +1,13 @@
 #pragma once
 /// \file
-/// Rays in the frame of an actor, each at its own time. x of the model stands at s R x + p of the world, R and p those
-/// of the track at the ray's time, so that a ray o + t d is
-///   o' = R^T (o - p) / s,   d' = R^T d,   t' = t / s
-/// there, and what a hit there says of o' and d' the world's ray and the pose take from it:
-///   dL/do = R dL/do' / s,   dL/dd = R dL/dd',   dL/dp = -dL/do,   dL/dw = -(o - p) x dL/do - d x dL/dd,
-/// w a small turn about p, as instances/instance.hpp has it. Arithmetic is in double; what rays are relative to in the
-/// actor's frame is a point near them. An actor that stands at the world's origin, in its axes, leaves rays their bits.
+/// Rays in the frame of an actor, each at its own time. A point x of the model stands at s R x + p of the world. R and
+/// p are those of the track at the ray's time. In the actor's frame a ray o + t d has
+///   o' = R^T (o - p) / s,   d' = R^T d,   t' = t / s.
+/// What a hit there says of o' and d' goes to the world's ray and the pose. They take
+///   dL/do = R dL/do' / s,   dL/dd = R dL/dd',   dL/dp = -dL/do,   dL/dw = -(o - p) x dL/do - d x dL/dd.
+/// Here w is a small turn about p, as instances/instance.hpp has it. Arithmetic is in double. What rays are relative to
+/// in the actor's frame is a point near them. An actor that stands at the world's origin, in its axes, leaves rays
+/// their bits.
 
 #include <gart/instances/instance_track.hpp>
 #include <gart/rays/batch_rays.hpp>
@@ -83,7 +84,7 @@ class moved_rays {
   /// Allocates nothing; `exec` must outlive it.
   explicit moved_rays(E& exec) : origins_(exec), directions_(exec), t_max_(exec) {}
 
-  /// Of an actor whose steps are in memory of the policy, of that scale; at rest where it has no times.
+  /// Of an actor of that scale, whose steps are in memory of the policy. It is at rest where it has no times.
   void move(E& exec, ray_batch const& rays, actor_view const& actor) {
     index_t const n = rays.count();
     bool const ends = !rays.t_max.empty();

@@ -1,11 +1,11 @@
 #pragma once
 /// \file
-/// A channel: what a ray sums besides its colour, over hits that a table has (channels/hit_table.hpp),
-///   S = sum over hits of w value + T beyond,
-/// w the weight of a hit, T what the last one lets through. A channel says three things of a hit. What does it add to
-/// the ray (add)? What is its weight worth to the loss (worth)? What do its Gaussian's parameters gain (pull)? The
-/// passes do the rest, for any channel and any number of them: channels/sum.hpp forward, channels/differentiate.hpp
-/// back.
+/// A channel: what a ray sums besides its colour, over hits that a table has (channels/hit_table.hpp):
+///   S = sum over hits of w value + T beyond.
+/// Here w is the weight of a hit, and T what the last one lets through. A channel says three things of a hit. What does
+/// it add to the ray (add)? What is its weight worth to the loss (worth)? What do its Gaussian's parameters gain
+/// (pull)? The passes do the rest, for any channel and any number of them: channels/sum.hpp forward,
+/// channels/differentiate.hpp back.
 ///
 /// Colour is the one channel that passes are fused with (render/composite.hpp, backward/): it decides nothing that
 /// these need. A new channel is a header here. It has a member in the targets and gradients (rays/ray_batch.hpp) and a

@@ -9,10 +9,10 @@
 ///   back.add_moments(table, gaussians, moments);            // dL/d geometry, for backward/finish.hpp
 ///   back.pull(table, features, count, by_features);         // dL/d the parameters of a channel, overwritten
 ///
-/// With v the worth of a hit and B what lies behind it,
-///   dL/dalpha = T v - B / (1 - alpha),   B = sum over hits behind of w v + T_end beyond,
-/// by a walk of each ray from its end, so that no long sum is taken from another. Without add() and add_moments() a
-/// channel is detached from the geometry: pull() needs the weights alone.
+/// Here v is the worth of a hit, and B what lies behind it. Then
+///   dL/dalpha = T v - B / (1 - alpha),   B = sum over hits behind of w v + T_end beyond.
+/// A walk of each ray from its end finds B, so that no long sum is taken from another. Without add() and add_moments()
+/// a channel is detached from the geometry: pull() needs the weights alone.
 ///
 /// Memory: 4 bytes a hit and a ray, 4 more a hit with depth, and the order by Gaussian. Each piece of a Gaussian's hits
 /// takes a row of 32 numbers (128 on hosts). Cost: the sort; a read of a channel's numbers for each hit in add() and

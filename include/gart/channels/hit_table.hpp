@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// The hits of rays in memory of a policy, as lists: those of ray r are [offsets[r], offsets[r + 1]), in order. They
+/// The hits of rays in memory of a policy, as lists. Those of ray r are [offsets[r], offsets[r + 1]), in order. They
 /// are exactly the hits that are composited. A ray program gives them to a hit_writer: that of a batch
 /// (rays/batch_composite.hpp) or of a view's pixels (channels/pixel_hits.hpp).
 ///

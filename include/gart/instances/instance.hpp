@@ -1,6 +1,7 @@
 #pragma once
 /// \file
-/// Models that stand in one world, each at a pose: actors of a scene, which is a model of its own. Host-safe and plain.
+/// Models that stand in one world, each at a pose: actors of a scene. The scene is a model of its own. Host-safe and
+/// plain.
 ///
 /// A model is a list of Gaussians in its own axes; any number of instances show it. Gaussians of the scene are numbered
 /// instance after instance, in the order of the list.
@@ -27,14 +28,14 @@ struct instance_gaussian {
   u32 gaussian = 0;  ///< its number in the model
 };
 
-/// Where the gradients of a scene's Gaussians go back to, in memory of the policy; empty or null where they are not
+/// Where the gradients of a scene's Gaussians go back to, in memory of the policy. Empty or null where they are not
 /// wanted. All are overwritten.
 struct instance_gradients {
   /// Of each model, of its size and at most the scene's SH degree: summed over its instances, zero without any.
   span<gaussians_view<float> const> models = {};
   span<feature_view<float> const> features = {};  ///< of each model, likewise
-  /// [instances][6]: dL/d position in world units, then dL/dw, a small turn w of the instance about its position: an
-  /// arm d becomes d + w x d (pose/pose.hpp has these axes for cameras).
+  /// [instances][6]: dL/d position in world units, then dL/dw. Here w is a small turn of the instance about its
+  /// position: an arm d becomes d + w x d. For cameras pose/pose.hpp has these axes.
   float* poses = nullptr;
 };
 

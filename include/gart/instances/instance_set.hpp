@@ -9,12 +9,12 @@
 ///   actors.backward(by_scene, {by_models, {}, by_poses});    // from dL/d scene()
 ///
 /// The scene holds a copy of each Gaussian for each instance, turned, scaled and moved with its harmonics
-/// (scene/similarity.hpp): every tracer, view, batch and gradient method takes it for a model, with hits in exact order
+/// (scene/similarity.hpp). Every tracer, view, batch and gradient method takes it for a model. Hits are in exact order
 /// over all instances, and a hit's direction is that of the instance's own axes. One pose holds for one trace.
 ///
-/// An instance at rest moves by dp as a camera does by -dp, and turns about its position as a camera does the other
-/// way: pose gradients are those of pose/differentiate_pose.hpp with the sign turned, over the instance's Gaussians.
-/// Sums go in the order of the list: the same bits in every run.
+/// An instance at rest moves by dp as a camera does by -dp. It turns about its position as a camera does the other way.
+/// So pose gradients are those of pose/differentiate_pose.hpp with the sign turned, over the instance's Gaussians. Sums
+/// go in the order of the list: the same bits in every run.
 ///
 /// Memory: 44 bytes and 12 a coefficient for each Gaussian of each instance, 236 at SH degree 3. Cost: one launch an
 /// instance that has moved, three an instance back. Errors: those of instance.hpp.

@@ -2,7 +2,7 @@
 /// \file
 /// Instances that move: a pose between two, and a track of poses at times. Rays see them as they stand at each ray's
 /// own time (actors/actor_tracer.hpp). As one scene for every tracer (instances/instance_set.hpp) they are traced in
-/// slices of time (rays/lidar.hpp, rays_during): what an actor is off by is half its way during a slice, at most.
+/// slices of time (rays/lidar.hpp, rays_during). An actor is off by half its way during a slice, at most.
 ///
 /// Errors: require_track throws invalid_argument, naming the track, the field and the remedy.
 
@@ -34,9 +34,10 @@ struct track_step {
   /// The position there.
   GART_HD vec3d position_at(double f) const { return position + way * f; }
 
-  /// From dL/dw of a small turn of the pose at f to that of the pose at the end; the one at the beginning has the rest.
-  /// With the turn's axis u and angle a, a turn b of the end is B b at f: along u f times itself, across it
-  /// (e^(i f a) - 1) / (e^(i a) - 1), a turn about u by (f - 1) a / 2 and a change of length. This is B's transpose.
+  /// From dL/dw of a small turn of the pose at f to that of the pose at the end. The one at the beginning has the rest.
+  /// With the turn's axis u and angle a, a turn b of the end is B b at f. Along u it is f times itself. Across u it is
+  /// (e^(i f a) - 1) / (e^(i a) - 1) times itself. That is a turn about u by (f - 1) a / 2 and a change of length. This
+  /// is B's transpose.
   GART_HD vec3d pull_back_to_end(double f, vec3d const& by_turn) const {
     double const angle = glm::length(turn);
     if (!(angle > 1e-9)) return by_turn * f;
@@ -55,8 +56,8 @@ inline instance between(instance const& from, instance const& to, double time) {
   return out;
 }
 
-/// An instance at poses of its own at each time: from the first key to the last, of one model and scale. One key: it
-/// stands at that pose at all times.
+/// An instance at a pose of its own at each time from the first key to the last. It is of one model and scale. One key:
+/// it stands at that pose at all times.
 struct instance_track {
   std::vector<double> times;    ///< [keys], ascending, in the unit of the rays' times
   std::vector<instance> poses;  ///< [keys]

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The footprint of a Gaussian in a view: its box of pixels, and how many pixels the boxes before have. There its own
-/// slots begin in a buffer with one for each pixel (backward/hit_layout.hpp).
+/// A Gaussian's footprint in a view: its box of pixels, and how many pixels the boxes before have. There its own slots
+/// begin in a buffer with one for each pixel (backward/hit_layout.hpp).
 
 #include <gart/tiles/grid.hpp>
 

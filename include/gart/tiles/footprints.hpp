@@ -92,8 +92,8 @@ class footprints {
         pair_offsets_(exec),
         totals_(exec, 2) {}
 
-  /// View: a camera or a camera model. Boxes are cut to `rows`. invalid_argument for a camera that no ray can be cast
-  /// by, or a near distance that is not positive.
+  /// View: a camera or a camera model. Boxes are cut to `rows`. Throws invalid_argument for a camera that no ray can be
+  /// cast by, or a near distance that is not positive.
   template <class Response = generalized_gaussian<>, class View>
   void measure(E& exec, gaussians_view<float const> scene, View const& view, float alpha_min, float near,
                image_rows rows = {}) {

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Which tiles of a Gaussian's box can hit it. Each (primitive, tile) pair is tested before it enters a list; a pair
-/// that fails is in no list.
+/// Which tiles of a Gaussian's box can hit it. Each (primitive, tile) pair is tested before it enters a list. A pair
+/// that fails is in no list. A test has:
 ///   of(i)                 what it needs of primitive i, for all its tiles
 ///   meets(p, cell, tile)  false only where no ray of the pair hits: `cell`, the box cut by the tile of this number
 ///

@@ -59,7 +59,7 @@ class depth_bits {
 /// one plane's grid; others are of any_depth_order.
 class depth_order : public detail::depth_bits {
  public:
-  /// depths: of each primitive, anywhere. gaussians: null where that is all there is to go by; else the depth is
+  /// `depths`: of each primitive, anywhere. `gaussians`: null where that is all there is to go by. Else the depth is
   /// bounded in each tile (math/rectangle_depth.hpp).
   depth_order(float const* depths, ray_gaussian const* gaussians, pinhole const& view)
       : depths_(depths), gaussians_(gaussians), rotation_(view.rotation) {

@@ -2,11 +2,12 @@
 /// \file
 /// Where the rays of a tile pass, for cameras whose rays are no plane's grid. A plane lies across the tile's middle ray
 /// with a grid of pixels on it. A bound says how far any ray of the tile lies from its place there. It is found from
-/// each of the rays. Whatever the lens, every ray through pixels [x0, x1) x [y0, y1) of the tile passes through
-///   origin + x dx + y dy,   x0 + inset - widen_x <= x <= x1 - inset + widen_x, y likewise, pixels counted from the
-///   tile's,
-/// whose part along the middle ray is 1: what a hit's distance is at least is a bound of math/rectangle_depth.hpp.
-/// Tiles that see more than some 100 degrees, or a line, have no plane. Cost: one launch, two readings of every ray.
+/// each of the rays. Whatever the lens, every ray through pixels [x0, x1) x [y0, y1) of the tile passes through a point
+/// P:
+///   P = origin + x dx + y dy,   x0 + inset - widen_x <= x <= x1 - inset + widen_x, y likewise.
+/// Both count pixels from the tile's corner. The part of P along the middle ray is 1. So math/rectangle_depth.hpp
+/// bounds what a hit's distance is at least. Tiles that see more than some 100 degrees, or a line, have no plane. Cost:
+/// one launch, two readings of every ray.
 
 #include <gart/camera/pixel_rays.hpp>
 #include <gart/tiles/grid.hpp>
