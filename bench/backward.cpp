@@ -1,4 +1,4 @@
-// The backward pass by method and tile size, and what it asks of the step before it: footprints and the hit buffer.
+// The backward pass by method and tile size. Also what it asks of the step before it: footprints and the hit buffer.
 #include "support/frame.hpp"
 
 #include <gart/backward/backward.hpp>

@@ -1,4 +1,4 @@
-// Features beside a view's colours: the hit list that they share, and what 1, 16 and 128 of them cost forward and back,
+// Features beside a view's colours, and the hit list that they share. What 1, 16 and 128 of them cost forward and back,
 // detached from the geometry and not.
 #include "support/frame.hpp"
 

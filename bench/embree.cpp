@@ -1,6 +1,6 @@
-// A view's rays as a batch by gart's tree, against Embree's packets of 16 on the same rays: user geometry over the same
-// boxes, the same arithmetic of hits, windows of 32 hits a ray, walked again for more. Built by name, where Embree 3
-// is.
+// A view's rays as a batch by gart's tree, against Embree's packets of 16 on the same rays. Embree has user geometry
+// over the same boxes, and the same arithmetic of hits. A ray has a window of 32 hits, and is walked again for more.
+// Built by name, where Embree 3 is.
 #include "support/frame.hpp"
 
 #include <gart/math/lanes.hpp>

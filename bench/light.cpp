@@ -1,7 +1,7 @@
-// A sample of paths through all pixels of the view: of Gaussians alone, and with a mirror ball on a rough floor under a
-// sun before the camera, by the number of bounces. What shadows cost, once a Gaussian and at each hit. Frames as a
-// viewer that moves asks for them, wall time from a camera to bytes on the host, and the times of their stages; of the
-// run's scene where it has one.
+// A sample of paths through all the view's pixels: of Gaussians alone, and with surfaces, by the number of bounces. The
+// surfaces are a mirror ball on a rough floor, under a sun before the camera. What shadows cost, once a Gaussian and at
+// each hit. Frames as a viewer that moves asks for them, of the run's scene where it has one. Their wall time goes from
+// a camera to bytes on the host. The times of their stages are beside it.
 #include "support/frame.hpp"
 
 #include <gart/light/path_tracer.hpp>

@@ -1,5 +1,5 @@
 // The OptiX tracer on one view, against tile lists, and on rays without any order, against the tree. Beside the times:
-// whether both show the same bits, candidates a ray, and the milliseconds of OptiX's launches and of gart's kernel.
+// whether both show the same bits, and the milliseconds of OptiX's launches and of gart's kernel.
 #include "support/frame.hpp"
 
 #include <gart/rays/ray_tracer.hpp>

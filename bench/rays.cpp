@@ -1,7 +1,7 @@
-// Rays: a view's, by tile lists, by the tree and as a batch; a lidar of 64 x 1024 at the view's place; rays without any
-// order from places near it. What they see, their hits, and their gradients in each form. `alone` is the walk that
-// takes rays one by one, `groups` the one by eight lanes a ray, `choice` beams of other widths than the library's.
-// Beside the times: whether the batch shows the same bits as what it is compared with.
+// Rays of a view, by tile lists, by the tree and as a batch. Also a lidar of 64 x 1024 at the view's place, and rays
+// without any order from places near it. What they see, their hits, and their gradients in each form. `alone` is the
+// walk that takes rays one by one, `groups` the one by eight lanes a ray. `choice` has beams of other widths than the
+// library's. Beside the times: whether the batch shows the same bits as what it is compared with.
 #include "support/frame.hpp"
 
 #include <gart/rays/lidar.hpp>
@@ -91,8 +91,8 @@ void trace(benchmark::State& state, E& exec) {
   state.counters["rays"] = b.rays.count();
 }
 
-// The same rays by the walks themselves: all of them one by one (widest: 0), or in beams of a width and a number of
-// candidates at most. grouped: those that are no beams by eight lanes each.
+// The same rays by the walks themselves. All go one by one (widest: 0), or in beams of a width and a number of
+// candidates at most. `grouped`: those that are no beams go by eight lanes each.
 template <gart::ray_list (*Rays)(), gart::execution E>
 void walks(benchmark::State& state, E& exec, float widest, int most, bool ordered = true, bool grouped = false) {
   using response = gart::generalized_gaussian<>;

@@ -1,4 +1,5 @@
-// From boxes to the list of primitives of every tile: by tile size, in the order that the tracer reads, or in none.
+// From boxes to the list of primitives of every tile, by tile size. Lists are in the order that the tracer reads, or in
+// none.
 #include "support/frame.hpp"
 
 #include <gart/tiles/tile_map.hpp>

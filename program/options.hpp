@@ -27,7 +27,8 @@ class recorded_options {
     entries_.push_back({flag.substr(2), option, [&value] { return nlohmann::json(value); }});
     return option;
   }
-  // A value with a text on the command line (T::of_text) and its own JSON (json, T::of_json), which throw usage_error.
+  // A value with a text on the command line (T::of_text) and its own JSON (json, T::of_json). Both readers throw
+  // usage_error.
   template <class T>
   requires requires(T const& v) { T::of_json(v.json()); }
   CLI::Option* add(CLI::App& app, std::string const& flag, T& value, std::string const& type, std::string const& help) {
@@ -52,10 +53,10 @@ class recorded_options {
     return option;
   }
   nlohmann::json values() const;
-  // Takes the values of an earlier run as if they stood on the command line, by the same checks. usage_error for an
-  // option that was given and says otherwise. io_error, naming `file` and the option, for one that is missing or
-  // invalid on the command line. Options of `may_rise` may be given a larger value, which then counts; the result names
-  // each with its earlier value.
+  // Takes the values of an earlier run as if they stood on the command line, by the same checks. Throws usage_error for
+  // an option that was given and says otherwise. Throws io_error, naming `file` and the option, for one that is missing
+  // or invalid on the command line. Options of `may_rise` may be given a larger value, which then counts. The result
+  // names each with its earlier value.
   nlohmann::json continue_from(nlohmann::json const& saved, std::filesystem::path const& file,
                                std::vector<std::string> const& may_rise = {});
 

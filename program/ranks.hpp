@@ -26,8 +26,8 @@ class ranks {
   static bool const built;  // with MPI
 
   // Replaces this process by MPI's launcher. It starts this command line as one rank for each of `gpus` GPUs of this
-  // host. Returns if `gpus` is 1, or if a launcher already started the ranks. usage_error where there are fewer GPUs,
-  // or no launcher.
+  // host. Returns if `gpus` is 1, or if a launcher already started the ranks. Throws usage_error where there are fewer
+  // GPUs, or no launcher.
   static void launch_on(int gpus, char** argv);
   // Starts MPI where several were launched, or `wanted` says that one needs it. usage_error where this build has none.
   static void start(bool wanted);

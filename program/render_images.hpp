@@ -24,8 +24,8 @@ struct image_choice {
 // usage_error for a name that there is not.
 void check_images(image_choice const& choice);
 
-// Writes the chosen images, the colour as EXR alone, and adds their numbers to `entry`. usage_error where 16 bits
-// cannot hold the values.
+// Writes the chosen images, the colour as EXR alone, and adds their numbers to `entry`. Throws usage_error where 16
+// bits cannot hold the values.
 void write_images(std::filesystem::path const& folder, std::string const& name, gart::rendered const& image,
                   gart::camera const& view, image_choice const& choice, nlohmann::json& entry);
 

@@ -8,8 +8,8 @@
 namespace gart_cli {
 
 // Holds DIR/.gart.lock (flock) until it is destroyed, and then removes it. A program that dies leaves the file and no
-// lock. Holds nothing where the file cannot be made: writers report the cause. io_error, naming the process, where
-// another one holds it.
+// lock. Holds nothing where the file cannot be made: writers report the cause. Throws io_error, naming the process,
+// where another one holds it.
 class run_lock {
  public:
   explicit run_lock(std::filesystem::path const& folder);
@@ -33,8 +33,8 @@ void remove_temporary_files(std::filesystem::path const& folder);
 
 // A run's files from its end: metrics, the report, the test views' poses and the images of renders/.
 void remove_results(std::filesystem::path const& folder);
-// Removes the intermediate files too: model, exposures, poses, checkpoint and history. config.json stays, so that the
-// folder is always known as gart's.
+// Removes the intermediate files too: model, exposures, poses, checkpoint and history. The file config.json stays, so
+// that the folder is always known as gart's.
 void remove_run(std::filesystem::path const& folder);
 
 }  // namespace gart_cli

@@ -1,9 +1,9 @@
 #pragma once
-// How a stage is timed. A benchmark is a function template over the policy,
+// How a stage is timed. A benchmark is a function template over the policy:
 //   template <gart::execution E> void scan(benchmark::State& state, E& exec);
 //   GART_BENCH("scan", scan)
-// registered as scan/serial and scan/openmp by a host compiler, as scan/cuda by nvcc with GART_BENCH_CUDA. measure()
-// runs what is timed: wall time on hosts, device time between two events on CUDA.
+// A host compiler registers it as scan/serial and scan/openmp, nvcc with GART_BENCH_CUDA as scan/cuda. What measure()
+// runs is timed: wall time on hosts, device time between two events on CUDA.
 
 #include <benchmark/benchmark.h>
 

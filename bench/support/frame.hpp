@@ -1,5 +1,5 @@
 #pragma once
-// The scene in a policy's memory, prepared for its view as a training step prepares it, and the tracers to prepare it
+// The scene in a policy's memory, prepared for its view as a training step prepares it. Also the tracers to prepare it
 // with.
 
 #include "support/bench.hpp"

@@ -1,6 +1,6 @@
 #pragma once
-// The Gaussians and the camera that every benchmark runs on: a splat PLY with a camera JSON, or Gaussians of our own
-// making: thin discs on three nested spheres, a few tens of hits a ray whatever their number.
+// The Gaussians and the camera that every benchmark runs on: a splat PLY with a camera JSON, or discs. The discs are
+// thin Gaussians of our own making, on three nested spheres. A ray has a few tens of hits, whatever their number.
 
 #include <gart/comm/row_owners.hpp>
 #include <gart/io/dataset.hpp>
@@ -32,8 +32,8 @@ struct scene_options {
 };
 
 scene make_scene(scene_options const& options);
-// Of discs, with all cameras, the rows that one rank has of so many Gaussians as no host may hold: Gaussian g is of
-// copy g % copies, so that each view finds the same share of its rows on every rank.
+// Of discs, with all cameras, the rows that one rank has of so many Gaussians as no host may hold. Gaussian g is of
+// copy g % copies. So each view finds the same share of its rows on every rank.
 scene make_part(scene_options const& options, gart::row_owners const& owners);
 // STEM.ply and STEM.json.
 void write_scene(std::filesystem::path const& stem, scene const& s);

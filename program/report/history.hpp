@@ -1,5 +1,5 @@
 #pragma once
-// The course of a training run, for the curves of its report. Any number of steps gives a few hundred points.
+// The course of a training run, for the curves of its report. Any number of steps gives a few hundred points. The file
 // history.json beside the checkpoint keeps it, so a resumed run has the whole curve.
 
 #include <gart/runtime/session.hpp>
@@ -32,8 +32,8 @@ class history {
   nlohmann::json to_json() const;
   // The points of PSNR over training seconds: "test" and "train", each a list of rows by its "..._columns".
   nlohmann::json psnr_over_seconds() const;
-  // Reads the points up to `step`: a checkpoint may be older than the history beside it. io_error for a file that is no
-  // history.
+  // Reads the points up to `step`: a checkpoint may be older than the history beside it. Throws io_error for a file
+  // that is no history.
   void restore(std::filesystem::path const& file, int step);
 
  private:

@@ -8,6 +8,7 @@
 //   DIR/scene.json                                        where asked for: the mirror that stands in the scene;
 //                                                         a flat one is in DIR/mirror.ply
 //   DIR/mesh.ply                                          where asked for: the scene itself, as triangles
+//
 // A training view through a rolling shutter has the poses of its first and last row. Through another camera than a
 // pinhole the transforms name its model and parameters in place of camera_angle_x. The transforms are written last,
 // each file whole: a capture that was interrupted is not taken for one.
@@ -48,7 +49,7 @@ inline constexpr synth_limits synth_views{1, 10000}, synth_size{8, 4096}, synth_
 // Cameras over the upper hemisphere, all looking at the origin: a Fibonacci spiral, the test views between its turns.
 std::vector<gart::camera> synth_cameras(int count, int size, bool test);
 
-// Errors: invalid_argument for an option out of its range, unsupported without Embree. io_error for a folder that
+// Errors: invalid_argument for an option out of its range, unsupported without Embree. Also io_error for a folder that
 // cannot be written, or that holds anything but an earlier capture of gart's own.
 void write_synth_capture(synth_options const& options, std::function<void(int done, int total)> const& progress = {});
 

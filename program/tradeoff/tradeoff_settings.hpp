@@ -30,8 +30,8 @@ struct setting {
 // The first is `exact` itself; values that it already has are left out.
 std::vector<setting> settings_of(configuration const& exact);
 
-// The settings whose knob or name is in `wanted`, and always the first; all if it is empty. usage_error for a word that
-// is neither.
+// The settings whose knob or name is in `wanted`, and always the first; all if it is empty. Throws usage_error for a
+// word that is neither.
 std::vector<setting> selected_settings(std::vector<setting> const& all, std::vector<std::string> const& wanted);
 
 }  // namespace gart_cli

@@ -76,7 +76,8 @@ struct train_arguments {
 void add_arguments(CLI::App& train, train_arguments& a);
 // Sets the options of the preset that the command line leaves open.
 void fill_in(CLI::App const& train, train_arguments& a);
-// Takes the options and the origin of the run in `out`, and its dataset if none was named. io_error without such a run.
+// Takes the options and the origin of the run in `out`, and its dataset if none was named. Throws io_error without such
+// a run.
 void continue_run(train_arguments& a);
 gart::configuration_request configuration_request_of(train_arguments const& a);
 // `background` is a colour's name or "random".

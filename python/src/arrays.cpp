@@ -38,7 +38,7 @@ bool c_order(std::vector<std::int64_t> const& shape, Stride const* strides, std:
   return true;
 }
 
-// None where there is no buffer, and where one is refused by what has DLPack: arrays of CuPy and JAX on a device.
+// None where there is no buffer, and where what has DLPack refuses one. Arrays of CuPy and JAX on a device do so.
 std::unique_ptr<Py_buffer> buffer_of(py::handle argument, bool& writable) {
   if (!PyObject_CheckBuffer(argument.ptr())) return nullptr;
   auto out = std::make_unique<Py_buffer>();

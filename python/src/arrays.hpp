@@ -1,6 +1,6 @@
 #pragma once
 // Memory of other Python libraries, and theirs of ours, without a copy. An argument lends its memory by the buffer
-// protocol (numpy, bytes, memoryview) or by DLPack (torch, CuPy, JAX, numpy); what gart makes on the host becomes a
+// protocol (numpy, bytes, memoryview) or by DLPack (torch, CuPy, JAX, numpy). What gart makes on the host becomes a
 // numpy array that owns it.
 
 #include "dlpack.hpp"

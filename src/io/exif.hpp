@@ -7,8 +7,8 @@
 
 namespace gart::io {
 
-// The EXIF orientation of a JPEG, 1 to 8; 1 if it has none. 5 to 8 turn it by a quarter for display. gart keeps pixels
-// as stored, like programs that calibrate cameras.
+// The EXIF orientation of a JPEG, 1 to 8; 1 if it has none. Orientations 5 to 8 turn it by a quarter for display.
+// Pixels are kept as stored, as programs that calibrate cameras keep them.
 int exif_orientation(std::vector<u8> const& jpeg);
 
 }  // namespace gart::io

@@ -1,9 +1,9 @@
 #pragma once
 // What readers of glTF 2.0 share (https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html). That is a file's JSON,
 // and its buffers within a GLB, in the JSON as base64, or beside it. Also the nodes of its scene, and the numbers of
-// accessors. A wrong type in the JSON is an exception of its library; readers make it an error of the file.
-// tinygltf 2.8 would not do: it reads a field of a wrong type as its default and 2^32 as 0, takes 1 GB for 1 MB of
-// materials "{}", and reads past the end of a GLB whose last chunk is cut by up to 8 bytes.
+// accessors. A wrong type in the JSON is an exception of its library. Readers make it an error of the file. The library
+// tinygltf 2.8 would not do. It reads a field of a wrong type as its default, and 2^32 as 0. It takes 1 GB for 1 MB of
+// materials "{}". It reads past the end of a GLB whose last chunk is cut by up to 8 bytes.
 
 #include <gart/core/error.hpp>
 #include <gart/core/types.hpp>

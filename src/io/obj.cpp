@@ -1,5 +1,5 @@
 // Wavefront OBJ and its MTL (http://paulbourke.net/dataformats/obj, .../mtl), and meshes of PLY. Of an MTL: Kd, Ke, Ns,
-// Ni, d or Tr, illum, Pr, Pm and the maps map_Kd, map_Ke and norm. Curves, lines and points are left out.
+// Ni, d or Tr, illum, Pr, Pm and the maps map_Kd, map_Ke and norm. Curves, lines and points are left out. The library
 // tinyobjloader 2.0 would not do: it reads what is no number as 0, and corner 2^32 + 1 as corner 1.
 
 #include "codec.hpp"

@@ -106,7 +106,7 @@ vec3d set_exact_means(gaussian_model& model, std::vector<double> const& exact) {
   return origin;
 }
 
-// Mip-splatting's Gaussians the way it draws them. s^2 becomes s^2 + f^2 along each axis, and the opacity falls with
+// Mip-splatting's Gaussians the way it draws them. Along each axis s^2 becomes s^2 + f^2, and the opacity falls with
 // the density. https://github.com/autonomousvision/mip-splatting
 void fuse_filter(gaussian_model& model, std::vector<double> const& filter) {
   for (std::size_t i = 0; i < model.size(); ++i) {

@@ -1,4 +1,4 @@
-// PNG through libpng. libpng reports errors by longjmp: between setjmp and the last libpng call no object with a
+// PNG through libpng, which reports errors by longjmp. Between setjmp and the last libpng call no object with a
 // destructor is created.
 
 #include "codec.hpp"

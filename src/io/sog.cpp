@@ -1,4 +1,4 @@
-// SOG, version 2: a zip file, or a folder, of lossless WebP textures, a pixel a Gaussian. meta.json says what their
+// SOG, version 2: a zip file, or a folder, of lossless WebP textures, a pixel a Gaussian. Its meta.json says what their
 // bytes mean. Scales and colours are numbers of a codebook, spherical harmonics rows of a palette.
 // https://developer.playcanvas.com/user-manual/gaussian-splatting/formats/sog/
 

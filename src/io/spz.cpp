@@ -41,7 +41,8 @@ std::array<std::size_t, streams> widths(header const& h) {
   return {h.version == 1 ? 6u : 9u, 1, 3, 3, h.version < 3 ? 3u : 4u, rest};
 }
 
-// Three of a unit quaternion's components in 10 bits each, a sign and a magnitude, and which is the fourth. x, y, z, w.
+// Three of a unit quaternion's components in 10 bits each, a sign and a magnitude. The top two bits say which is the
+// fourth. The order is x, y, z, w.
 u32 pack_rotation(float const* wxyz) {
   std::array<double, 4> q = unit(wxyz);
   q = {q[1], q[2], q[3], q[0]};

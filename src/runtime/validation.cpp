@@ -78,8 +78,8 @@ struct end_all_on_failure {
   }
 };
 
-// Calls run(i, go_on) for each trial, in turn or in parallel threads. go_on() counts a step, and returns false once
-// `progress` has ended the measurement.
+// Calls run(i, go_on) for each trial, in turn or in parallel threads. A call of go_on() counts a step, and returns
+// false once `progress` has ended the measurement.
 template <class Run>
 void run_trials(validation_plan const& plan, validation_progress const& progress, Run run) {
   double const all = static_cast<double>(plan.trials) * (plan.steps + 1);

@@ -40,8 +40,8 @@ class access {
   std::string control_ = new_token(), view_ = new_token();
 };
 
-// The numeric address to listen at, and the names under which browsers may ask for it. invalid_argument for anything
-// but an IPv4 address or name of this machine.
+// The numeric address to listen at, and the names under which browsers may ask for it. Throws invalid_argument for
+// anything but an IPv4 address or name of this machine.
 struct listen_place {
   std::string address;
   std::vector<std::string> hosts;  // the first is the one to print

@@ -1,11 +1,12 @@
 #pragma once
 /// \file
 /// Cameras in files: the names of models, and the camera JSON of load_cameras (io/dataset.hpp). It is [{"name",
-/// "width", "height", "fx", "fy", "cx", "cy", "c2w": 4 rows of 4}, ...] in pixels. c2w maps camera to world, in OpenCV
-/// axes. Cameras other than pinholes have "camera_model", by COLMAP's name, and the parameters of the lens. A rolling
-/// shutter has its direction in "shutter_type", as "ROLLING_TOP_TO_BOTTOM". c2w is then the pose of the first line
-/// read, and "c2w_end" that of the last. An "origin" of three numbers is added to positions as they are read. Written
-/// whole or not at all, with every digit. Errors: io_error; unsupported for a lens with terms that no one model has.
+/// "width", "height", "fx", "fy", "cx", "cy", "c2w": 4 rows of 4}, ...] in pixels. The pose c2w maps camera to world,
+/// in OpenCV axes. Cameras other than pinholes have "camera_model", by COLMAP's name, and the parameters of the lens. A
+/// rolling shutter has its direction in "shutter_type", as "ROLLING_TOP_TO_BOTTOM". Then c2w is the pose of the first
+/// line read, and "c2w_end" that of the last. An "origin" of three numbers is added to positions as they are read.
+/// Written whole or not at all, with every digit. Errors: io_error; unsupported for a lens with terms that no one model
+/// has.
 
 #include <gart/scene/camera.hpp>
 

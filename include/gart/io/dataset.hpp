@@ -1,6 +1,7 @@
 #pragma once
 /// \file
-/// A capture in host memory: views with cameras and 8-bit images, a split, starting points where the files have them.
+/// A capture in host memory. It has views with cameras and 8-bit images, a split, and starting points where the files
+/// have them.
 ///
 /// load_dataset recognises, in a folder or by the file named: COLMAP, Blender, and nerfstudio / instant-ngp. COLMAP:
 /// sparse/0 or its larger neighbour, sparse, the same below colmap, or the folder itself. Of its files .bin goes before
@@ -10,8 +11,8 @@
 /// masks beside them (docs/formats.md). Survey coordinates count from an origin among the cameras (io/origin.hpp).
 /// Images are decoded in parallel and kept as 8 bits: width * height * channels bytes each. Frames without a photo or
 /// with an invalid pose are left out with a note. So are points that are not finite, and points in a camera's centre.
-/// Errors: io_error naming the file, the field and the remedy. unsupported, naming the model, for a camera that gart
-/// does not trace. invalid_argument for an option out of its range.
+/// Errors: io_error naming the file, the field and the remedy. Also unsupported, naming the model, for a camera that
+/// gart does not trace. Also invalid_argument for an option out of its range.
 
 #include <gart/comm/host_group.hpp>
 #include <gart/core/names.hpp>

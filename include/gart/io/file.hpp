@@ -1,7 +1,8 @@
 #pragma once
 /// \file
-/// Files written whole or not at all: to a temporary name beside the target, flushed to the disk, then renamed. A full
-/// disk, or a folder that is missing or not writable, is an io_error naming the target. It leaves no half-written file.
+/// Files written whole or not at all. Each goes to a temporary name beside the target, is flushed to the disk, then
+/// renamed. A full disk, or a folder that is missing or not writable, is an io_error naming the target. It leaves no
+/// half-written file.
 
 #include <gart/core/types.hpp>
 

@@ -16,7 +16,7 @@
 namespace gart {
 
 /// The origin for some places. It is zero where floats resolve a hundred-thousandth of their spread. Else it is their
-/// median, rounded to a power of ten within the spread. 99 of 100 places lie within the spread of the median. If it is
+/// median, rounded to a power of ten within the spread. Of 100 places 99 lie within the spread of the median. If it is
 /// zero, that of `others` counts, and else 1. O(places).
 vec3d origin_for(std::vector<vec3d> const& places, std::vector<double> const& others = {});
 

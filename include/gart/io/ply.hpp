@@ -1,13 +1,15 @@
 #pragma once
 /// \file
-/// Splat files in the layout of the INRIA reference: binary little endian, every property a float, in the order
+/// Splat files in the layout of the INRIA reference. They are binary little endian, and every property is a float. The
+/// order is
 ///   x y z nx ny nz f_dc_0..2 f_rest_0..(3K-4) opacity scale_0..2 rot_0..3
-/// f_rest channel-major, opacity a logit, scales logarithms, rot w,x,y,z and not normalised. It is written in that
-/// order, byte for byte. It is read by name in any order, ascii or binary of either endianness, without normals and
-/// with extra properties. Features (scene/features.hpp) are floats feature_0 to feature_(N-1) behind these. They are
-/// read where their numbers begin at 0 and have no gap. gart's own traits travel as header comments ("comment gart
-/// kernel_degree 2"). A model with the trait antialias also gets other programs' mark, "comment SplatRenderMode: mip".
-/// A file with that mark or "comment antialiased 1", and without gart's trait, is read as antialiased without a value.
+/// The coefficients f_rest are channel-major. Opacity is a logit, and scales are logarithms. The rotation rot is
+/// w,x,y,z and not normalised. A file is written in that order, byte for byte. It is read by name in any order, ascii
+/// or binary of either endianness, without normals and with extra properties. Features (scene/features.hpp) are floats
+/// feature_0 to feature_(N-1) behind these. They are read where their numbers begin at 0 and have no gap. Traits of
+/// gart's own travel as header comments ("comment gart kernel_degree 2"). A model with the trait antialias also gets
+/// other programs' mark, "comment SplatRenderMode: mip". A file with that mark or "comment antialiased 1", and without
+/// gart's trait, is read as antialiased without a value.
 ///
 /// Errors: io_error naming the file, the property and the remedy. It is thrown for a truncated body, a missing
 /// property, and numbers of f_rest that make no degree from 0 to 3. Also for a 2D Gaussian file (no scale_2), and where

@@ -1,15 +1,15 @@
 #pragma once
 /// \file
 /// Files of Gaussians in any format that gart knows: one table has them. A reader knows a file by its first bytes, a
-/// writer by the ending of its name. docs/formats.md describes each format and its cost.
+/// writer by the ending of its name. The page docs/formats.md describes each format and its cost.
 ///
 /// Every model is in the axes of a splat PLY. Other axes are turned as files are read and written (SPZ: y up, z back;
 /// GLB: y up, x left). Colours that depend on direction turn too.
 ///
-/// Errors: io_error naming the file and the supported formats, where it has none of them. io_error naming a property
-/// that changes the image and that the format cannot hold. io_error naming the package to install, where gart was built
-/// without it. Else as the format's reader and writer (io/ply.hpp). invalid_argument for a model whose arrays disagree
-/// in size, and for a packing out of its range.
+/// Errors: io_error naming the file and the supported formats, where it has none of them. Also io_error naming a
+/// property that changes the image and that the format cannot hold. Also io_error naming the package to install, where
+/// gart was built without it. Else as the format's reader and writer (io/ply.hpp). Also invalid_argument for a model
+/// whose arrays disagree in size, and for a packing out of its range.
 
 #include <gart/comm/row_owners.hpp>
 #include <gart/core/span.hpp>

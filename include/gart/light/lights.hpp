@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// Lights as a path meets them: what one gives to a point, drawn over its size, and what a ray that runs into it sees.
-/// Disks in the sky and spheres are drawn over their cone, rectangles over their area; point lights and disks without a
-/// size are one direction.
+/// Lights as a path meets them: what one gives to a point, drawn over its size. Also what a ray that runs into one
+/// sees. Disks in the sky and spheres are drawn over their cone, rectangles over their area. Point lights and disks
+/// without a size are one direction.
 
 #include <gart/light/scene_view.hpp>
 
@@ -126,7 +126,7 @@ GART_HD GART_INLINE lit_share lit_at(scene_view const& scene, vec3 const& point,
   return out;
 }
 
-// What is left of a captured colour where some of the lights are shadowed; or the light itself, for an albedo.
+// What is left of a captured colour where some of the lights are shadowed. For an albedo it is the light itself.
 struct shadow_rule {
   float ambient = 0.3f;
   bool relight = false;

@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// A view with mirrors and shadows in it, and the gradients of its Gaussians: those before a surface, those that a
-/// mirror shows, and those that throw a shadow on a mesh. A ray goes through the middle of each pixel, and on from
-/// mirrors alone. Any other surface ends it with what it emits and what the lights give it, through the Gaussians in
-/// between.
+/// A view with mirrors and shadows in it, and the gradients of its Gaussians. These are Gaussians before a surface,
+/// Gaussians that a mirror shows, and Gaussians that throw a shadow on a mesh. A ray goes through the middle of each
+/// pixel, and on from mirrors alone. Any other surface ends it with what it emits and what the lights give it, through
+/// the Gaussians in between.
 ///
 ///   mirror_paths<E> paths(exec);
 ///   paths.set_scene(scene);
@@ -11,19 +11,21 @@
 ///   paths.forward(view, options, path_options, color);
 ///   paths.backward(by_color, gradients.view());
 ///
-/// Or of the pixels alone that meet a mirror first: a trainer shows the others. Its loss sees both in one image
-/// (forward), takes the gradient out of the pixels of mirrors (take_out), and adds what it comes to before the
-/// optimizer's step (backward, with_what::there_is). train/learned/mirrors.hpp trains so.
+/// With mirror_pixels::mirrors it traces the pixels alone that meet a mirror first: a trainer shows the others. The
+/// trainer's loss sees both in one image (forward). The trainer then takes the gradient out of the pixels of mirrors
+/// (take_out). Before the optimizer's step it adds what that gradient comes to (backward, with_what::there_is).
+/// train/learned/mirrors.hpp trains so.
 ///
-/// With C and T what a segment's Gaussians add and let through, and b a mirror's colour, a path from segment k on has
-///   L_k = C_k + T_k B_k,   B_k = b_k L_(k + 1) at a mirror, else what shines there + sum of T_l E_l,
-/// E_l what light l gives through its shadow ray, T_l what the Gaussians along it let through. Segments and shadow rays
-/// are batches of rays (rays/ray_tracer.hpp), whose contexts have the gradients by C and T. Where a Gaussian's largest
-/// response crosses a surface, it goes from one segment to the next: a step that has no gradient. No more has what
-/// meshes hide of a light from a Gaussian: by it a Gaussian's colour is scaled, and so is the colour's gradient.
+/// A path from segment k on has L_k = C_k + T_k B_k. C and T are what a segment's Gaussians add and let through. B_k is
+/// what shines at its end, plus b_k L_(k + 1) at a mirror of colour b_k. At a rough surface the sum of T_l E_l over the
+/// lights l is added instead. E_l is what light l gives through its shadow ray. T_l is what the Gaussians along that
+/// ray let through. Segments and shadow rays are batches of rays (rays/ray_tracer.hpp), whose contexts have the
+/// gradients by C and T. A Gaussian whose largest response crosses a surface goes from one segment to the next. This
+/// step has no gradient. Nor has the shadow of meshes on a Gaussian: a factor scales the Gaussian's colour and the
+/// colour's gradient alike.
 ///
-/// Of path_options count bounces, shadows (none or per-gaussian), ambient, relight, and the seed, which draws one point
-/// of each light that has a size.
+/// Of path_options it reads bounces, shadows (none or per-gaussian), ambient, relight and the seed. The seed draws one
+/// point of each light that has a size.
 /// Memory: 100 bytes a pixel and segment, 60 more a light, what contexts hold, and the gradients of a second model.
 /// Errors: invalid_argument as ray_tracer and path_tracer throw it, for shadows per hit, decoded colours and calls out
 /// of order.
@@ -117,8 +119,8 @@ class mirror_paths {
                    light_kernels::put_pixels{pixels_.data(), segments_[0]->seen.data(), color});
   }
 
-  /// From dL/d colour, [H][W][3] of the last forward, to dL/d Gaussians, of their number and at least the degree that
-  /// is evaluated. There are gradients that it is added to, or it takes their place.
+  /// From dL/d colour of the last forward, [H][W][3], to dL/d Gaussians. `gradients` has their number and at least the
+  /// degree that is evaluated. `with` says whether the result is added to what is there, or takes its place.
   void backward(span<float const> by_color, gaussians_view<float> gradients, with_what with = with_what::nothing) {
     require_begun(by_color.size(), "mirror_paths.backward");
     index_t const n = static_cast<index_t>(pixels_.size());

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Mirrors that are known to be in a capture, as trainers meet them: compiled once a policy and response
-/// (runtime/compiled_paths.hpp registers them), found by the names of these. What they do: light/mirror_paths.hpp.
+/// Mirrors that are known to be in a capture, as trainers meet them. They are compiled once a policy and response, and
+/// found by the names of these (runtime/compiled_paths.hpp registers them). What they do: light/mirror_paths.hpp.
 ///
 /// Errors: unsupported, naming those there are; invalid_argument for a scene without a mirror, or one that cannot be
 /// traced.

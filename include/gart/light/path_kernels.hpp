@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// What is done to paths between their segments: cast from the camera, ended at a triangle or a light, lit, and sent
-/// on. An index is a path.
+/// What is done to paths between their segments. They are cast from the camera, ended at a triangle or a light, lit,
+/// and sent on. An index is a path.
 
 #include <gart/camera/models.hpp>
 #include <gart/light/path_options.hpp>
@@ -79,8 +79,8 @@ GART_HD GART_INLINE vec3 bounded(vec3 const& c, float most, u32 bounces) {
   return most > 0 && bounces > 0 && top > most ? c * (most / top) : c;
 }
 
-// A shadow ray from the surface that each path has come to, to one of the lights; the last is what lies around. Alone:
-// no path goes on from a surface to meet a light by chance.
+// A shadow ray from the surface that each path has come to, to one of the lights. The last light is what lies around.
+// Alone: no path goes on from a surface to meet a light by chance.
 struct aim_at_light {
   scene_view scene;
   path const* paths;

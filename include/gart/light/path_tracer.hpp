@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// Paths of light through Gaussians and a scene, on every policy: each sample of all pixels goes in waves, a segment at
-/// a time. Triangles and lights end it, Gaussians are blended along it (light/paths.hpp), shadow rays are sent to each
-/// light, and the surface sends the path on (light/path_kernels.hpp).
+/// Paths of light through Gaussians and a scene, on every policy. Each sample of all pixels goes in waves, a segment at
+/// a time. Triangles and lights end a segment, and Gaussians are blended along it (light/paths.hpp). Shadow rays are
+/// sent to each light, and the surface sends the path on (light/path_kernels.hpp).
 ///
 ///   path_tracer<E> tracer(exec);
 ///   tracer.set_model(gaussians.view(), sh_degree);
@@ -10,19 +10,19 @@
 ///   tracer.begin(view, options, paths);
 ///   tracer.add(16);
 ///
-/// Where all rays of a sample have one centre and no lens bends them, a sample's jitter is one for all pixels: the
+/// Where all rays of a sample have one centre and no lens bends them, all pixels share its jitter. Such a sample is the
 /// image of a pinhole whose principal point is moved. Devices then find the hits of first segments by tiles
 /// (trace/tile_tracer.hpp), which are the same as those by the tree.
 ///
-/// Gaussians alone, without jitter, give the colours of the renderers, bit for bit. Of one seed every policy draws the
-/// same numbers; what follows from them is the same bits on hosts, and on a device compiled with -fmad=false.
+/// Gaussians alone, without jitter, give the colours of the renderers, bit for bit. From one seed every policy draws
+/// the same numbers. What follows from them has the same bits on hosts, and on a device compiled with -fmad=false.
 ///
 /// Samples that are not finite count as black, so that one broken texel or Gaussian does not spoil its pixel.
 ///
-/// Memory: the tree over the Gaussians and 64 bytes each, 12 more for shadows per Gaussian; 150 bytes a triangle; 150
-/// bytes a pixel; the lists of tiles. Cost of a sample: a walk through triangles and one through Gaussians a segment,
-/// and the same a light at each rough surface.
-/// Errors: invalid_argument for a camera, options or a scene that nothing can be traced by, and for calls out of order.
+/// Memory: the tree over the Gaussians and 64 bytes each, 12 more for shadows per Gaussian. Also 150 bytes a triangle,
+/// 150 bytes a pixel, and the lists of tiles. Cost of a sample: a walk through triangles and one through Gaussians for
+/// each segment. Each rough surface costs the same again for each light.
+/// Errors: invalid_argument for a camera, options or a scene that cannot be traced, and for calls out of order.
 
 #include <gart/light/path_kernels.hpp>
 #include <gart/light/placed_scene.hpp>

@@ -1,14 +1,14 @@
 #pragma once
 /// \file
-/// Paths on their way, one a pixel in the order of blocks (trace/pixel_order.hpp), and what Gaussians do to them: the
-/// ray programs of a segment, of a shadow ray and of a picture's layers.
+/// Paths on their way, one a pixel in the order of blocks (trace/pixel_order.hpp), and what Gaussians do to them. Here
+/// are the ray programs of a segment, of a shadow ray and of a picture's layers.
 ///
-/// A segment goes from where a path began or met a surface to the next surface, and takes the hits whose t lies in
-/// (near, far]: a hit is where its Gaussian's response is largest along the ray, so a Gaussian that reaches through a
-/// surface counts whole on one side of it. Against density that is spread along the ray its light is off by at most
-/// 1 - sqrt(1 - alpha), where the surface goes through its middle (tests/light/physics.cpp measures it). A path that
-/// goes straight on keeps its origin and begins its next segment where the last ended, with the same t to the bit: no
-/// hit is taken twice, and none is lost.
+/// A segment goes from where a path began or met a surface to the next surface. It takes the hits whose t lies in
+/// (near, far]. A hit is where its Gaussian's response is largest along the ray. So a Gaussian that reaches through a
+/// surface counts whole on one side of it. Its light is off by at most 1 - sqrt(1 - alpha) against density that is
+/// spread along the ray. It is off most where the surface goes through its middle (tests/light/physics.cpp measures
+/// it). A path that goes straight on keeps its origin. Its next segment begins where the last ended, with the same t to
+/// the bit. So no hit is taken twice, and none is lost.
 
 #include <gart/light/lights.hpp>
 #include <gart/math/srgb.hpp>

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// A scene in a policy's memory: as it was set, and as it stands in the frame of a view. The tree over its triangles is
-/// built when it is set, and refitted where the frame moves.
+/// A scene in a policy's memory, as set and as it stands in the frame of a view. The tree over its triangles is built
+/// when it is set, and refitted where the frame moves.
 
 #include <gart/exec/buffer.hpp>
 #include <gart/exec/parallel.hpp>

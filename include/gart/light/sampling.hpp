@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// Numbers that paths are drawn by, and what directions are made of them. Numbers come from Sobol's first two
-/// dimensions, shuffled and scrambled for each pixel and use (Burley, "Practical hash-based Owen scrambling", JCGT
-/// 2020): integers throughout, so every policy draws the same. Angles go through polynomials, for the same bits in what
+/// Numbers that paths are drawn by, and what directions are made of them. Numbers are Sobol's first two dimensions,
+/// shuffled and scrambled for each pixel and use (Burley, "Practical hash-based Owen scrambling", JCGT 2020). They are
+/// integers throughout, so every policy draws the same. Angles go through polynomials, for the same bits in what
 /// follows.
 
 #include <gart/core/macros.hpp>

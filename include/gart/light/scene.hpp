@@ -102,8 +102,8 @@ struct scene {
   environment around;               ///< black where nothing is set
 };
 
-/// Throws invalid_argument for what cannot be traced: numbers that are not finite or out of their range, places that
-/// are not there, arrays whose sizes disagree.
+/// Throws invalid_argument for what cannot be traced. Such are numbers not finite or out of range, places that are not
+/// there, and arrays whose sizes disagree.
 void require_scene(scene const& s);
 
 }  // namespace gart::light

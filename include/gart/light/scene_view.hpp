@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The scene as kernels hold it, in the frame of the rays: triangles with what stands at their corners, materials,
-/// textures, lights and what lies around them.
+/// The scene as kernels hold it, in the frame of the rays. It has triangles with what stands at their corners,
+/// materials, textures, lights and what lies around them.
 
 #include <gart/bvh/triangle.hpp>
 #include <gart/light/sampling.hpp>

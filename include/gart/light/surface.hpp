@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// What a rough surface does with light: glTF's metallic-roughness, a diffuse base under GGX with Smith's height-
-/// correlated shadowing and Schlick's Fresnel. No light is lost: what one reflection in the microfacets leaves out is
-/// given back (Turquin, "Practical multiple scattering compensation for microfacet models", 2019), and the base gets
+/// What a rough surface does with light, by glTF's metallic-roughness: a diffuse base under GGX. GGX has Smith's
+/// height-correlated shadowing and Schlick's Fresnel. No light is lost. What one reflection in the microfacets leaves
+/// out is given back (Turquin, "Practical multiple scattering compensation for microfacet models", 2019). The base gets
 /// what the layer above it lets through. Reflections are drawn by visible normals (Dupuy and Benyoub, "Sampling visible
 /// GGX normals with spherical caps", HPG 2023).
 
@@ -12,7 +12,8 @@
 
 namespace gart { inline namespace GART_ISA { namespace light_kernels {
 
-// Directional albedos of GGX: of F = F0 + (rim - F0) Fc they are F0 (x - y) + rim y, x where F is 1, y of Fc alone.
+// Directional albedos of GGX. With F = F0 + (rim - F0) Fc the albedo is F0 (x - y) + rim y. There x is the albedo where
+// F is 1, and y that of Fc alone.
 constexpr int specular_side = 32;  // roughness across, the root of the cosine down: it bends most where that is small
 
 constexpr float least_alpha = 2e-3f;

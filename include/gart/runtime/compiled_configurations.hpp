@@ -2,7 +2,7 @@
 /// \file
 /// Turns templates into configurations: sessions and renderers of a policy, traits, a tracer and a method. Include it
 /// where the policy's kernels can be compiled. In GART_REGISTER_CONFIGURATIONS call register_configurations for all SH
-/// degrees, or register_configuration_of for one configuration, which takes models up to its degree:
+/// degrees, or register_configuration_of for one configuration. The latter takes models up to its degree:
 ///   using response = gart::generalized_gaussian<4>;
 ///   GART_REGISTER_CONFIGURATIONS(my_configurations,
 ///                                gart::register_configuration_of<gart::openmp_exec, gart::scene_traits<3, response>,

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The data that the forward pass of a view or of a batch of rays keeps for its backward pass. Each context stands
-/// alone, so other passes may run in between.
+/// The data that the forward pass of a view or a batch of rays keeps for its backward pass. Each context stands alone,
+/// so other passes may run in between.
 
 #include <gart/rays/ray_batch.hpp>
 #include <gart/scene/gaussians.hpp>

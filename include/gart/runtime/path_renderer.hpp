@@ -11,8 +11,8 @@
 ///   image_float picture = tracer->picture();
 ///
 /// Memory: the tree over the Gaussians as for batches, 150 bytes a triangle, 150 bytes a pixel.
-/// Errors: unsupported where light is not compiled for the backend. invalid_argument for options, scenes and cameras
-/// that cannot be traced, and for a picture before there is a sample. out_of_memory.
+/// Errors: unsupported where light is not compiled for the backend. Also invalid_argument for options, scenes and
+/// cameras that cannot be traced, and for a picture before there is a sample. Also out_of_memory.
 
 #include <gart/exec/profile.hpp>
 #include <gart/light/path_options.hpp>

@@ -11,13 +11,13 @@
 ///
 /// A renderer, with its contexts, serves one thread at a time.
 ///
-/// Every renderer also traces batches of any rays (rays/ray_batch.hpp). forward() keeps the data for the gradient of a
-/// view or of a batch; any number of contexts may wait.
+/// Every renderer also traces batches of any rays (rays/ray_batch.hpp). A call of forward() keeps the data for the
+/// gradient of a view or of a batch. Any number of contexts may wait.
 ///
 /// Errors: unsupported where no compiled configuration meets the request, naming those that exist and how to compile
-/// one. invalid_argument for Gaussians of another SH degree, for arrays that disagree in size, and for options out of
-/// range. The same for options.rebuild_every with a tracer that builds no tree. out_of_memory; other errors of the
-/// policy.
+/// one. Also invalid_argument for Gaussians of another SH degree, for arrays that disagree in size, and for options out
+/// of range. The same for options.rebuild_every with a tracer that builds no tree. Also out_of_memory, and other errors
+/// of the policy.
 
 #include <gart/exec/profile.hpp>
 #include <gart/pose/pose.hpp>

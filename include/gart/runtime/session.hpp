@@ -4,7 +4,7 @@
 /// at run time from the compiled ones. Code that no device compiler sees, such as the `gart` program, uses it.
 ///
 /// Errors: unsupported where no compiled configuration meets the request, naming those that exist and how to compile
-/// one. out_of_memory; other errors of the policy.
+/// one. Also out_of_memory, and other errors of the policy.
 
 #include <gart/exec/profile.hpp>
 #include <gart/exposure/exposure_field.hpp>
@@ -59,8 +59,8 @@ class session {
   /// Takes up the run of a state. Errors: invalid_argument for a state of another degree.
   virtual void set_state(training_state const& state) = 0;
 
-  /// The learned exposures of the training views and their lenses; empty where none are learned. render() shows the
-  /// scene without them.
+  /// The learned exposures of the training views and their lenses; empty where none are learned. The call render()
+  /// shows the scene without them.
   virtual exposure_field exposures() const { return {}; }
   /// The learned cameras of the training views, in order; empty where neither poses nor lenses are learned.
   virtual std::vector<named_camera> poses() const { return {}; }

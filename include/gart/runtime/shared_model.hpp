@@ -10,16 +10,17 @@
 ///   });
 ///
 /// The rule of threads: a renderer, and what it made (contexts), is used by one thread at a time. A shared model never
-/// changes and is only read, by any number of renderers and threads at once; the handle is copied and dropped by any.
+/// changes and is only read, by any number of renderers and threads at once. Any thread may copy and drop the handle.
 /// The memory goes with the last handle. A renderer keeps one until it is given another model or ends, and waits for
 /// its own work first.
 ///
-/// Batches are traced by the shared tree where they have its options.alpha_min, else by a tree of the renderer's own;
-/// hits are the same bits. Views read the Gaussians and make what their tracer needs.
+/// Batches are traced by the shared tree where they have its options.alpha_min, else by a tree of the renderer's own.
+/// Hits are the same bits. Views read the Gaussians and make what their tracer needs.
 ///
 /// Cost: a copy of the model and a tree, once (rays/shared_index.hpp). Errors: unsupported as make_renderer, and where
-/// batches of rays are not compiled; invalid_argument for a model of another SH degree than the request's, and by
-/// renderer.share_model for a handle of another backend, device, SH degree, kernel degree or instruction set.
+/// batches of rays are not compiled. Also invalid_argument for a model of another SH degree than the request's. The
+/// call renderer.share_model throws it for a handle of another backend, device, SH degree, kernel degree or instruction
+/// set.
 
 #include <gart/channels/targets.hpp>
 #include <gart/render/options.hpp>
@@ -47,8 +48,8 @@ class shared_model {
   virtual std::size_t bytes() const = 0;
 };
 
-/// Copies a model and builds its tree, for the backend, the device and the degrees of a request: its tracer, method,
-/// stream and threads may differ from a renderer's. `frame`: a point of the world near which most rays begin.
+/// Copies a model and builds its tree, for the backend, the device and the degrees of a request. The request's tracer,
+/// method, stream and threads may differ from a renderer's. `frame`: a point of the world near which most rays begin.
 std::shared_ptr<shared_model const> make_shared_model(configuration_request const& request, gaussian_model const& model,
                                                       render_options const& options = {},
                                                       vec3d const& frame = vec3d(0.0));

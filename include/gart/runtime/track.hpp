@@ -38,7 +38,7 @@ struct track_result {
   std::vector<float> residuals;  ///< root mean squared error of the best pose after each step, without blur
 };
 
-/// Finds the pose by the renderer's model. photo: 3 channels, [0, 1]. mask: empty, or 1 channel of the photograph's
+/// Finds the pose by the renderer's model. `photo`: 3 channels, [0, 1]. `mask`: empty, or 1 channel of the photograph's
 /// size with 0 where pixels do not count.
 track_result track(renderer& renderer, image_float const& photo, camera const& guess, track_options const& options = {},
                    image8 const& mask = {});

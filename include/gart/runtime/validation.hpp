@@ -13,8 +13,8 @@
 /// (bench/results/trial_candidates.json), so all such candidates are taken together. A claim would need twice the
 /// noise; here a wrong choice costs the same either way. Exposures are taken unless they lose more than three
 /// times the noise. A short trial visits each photograph too few times for its twelve numbers to settle. So it shows
-/// them worse than a whole run does: bonsai's loses 0.1 dB, many_cameras' 0.3, and the runs gain 0.3 and 0.9
-/// (bench/results/exposure_rates.json, chosen_full.json).
+/// them worse than a whole run does. The trials of bonsai and many_cameras lose 0.1 and 0.3 dB, and their runs gain 0.3
+/// and 0.9 (bench/results/exposure_rates.json, chosen_full.json).
 ///
 /// Cost: about a tenth of a run's time (plan_validation), more where the run's own images are small. Trials have a
 /// fixed number of steps: on the serial policy the choice does not depend on the machine's load. On a GPU the trials

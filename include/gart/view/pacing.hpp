@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Limits the size of views, so that they arrive in time, and the time that they take from a training. Pure functions
-/// of measured times: no clock, no threads.
+/// Limits the size of views, so that they arrive in time. It also limits the time that they take from a training. Pure
+/// functions of measured times: no clock, no threads.
 
 #include <gart/core/isa.hpp>
 
