@@ -144,7 +144,7 @@ train_options of_trial(train_options options, validation_plan const& plan) {
 
 std::vector<candidate> default_candidates(capture_traits const& traits, train_options const& options) {
   std::vector<candidate> all;
-  all.push_back({"exposure", "on", [](train_options& o) { o.exposure = true; }, -3});
+  all.push_back({"exposure", "on", [](train_options& o) { o.exposure = true; }, -2});
   if (!traits.panoramas) all.push_back({"vignetting", "on", [](train_options& o) { o.vignetting = true; }});
   all.push_back({"rates.sh_rest", "0.000125", [](train_options& o) { o.rates.sh_rest = 0.000125f; }});
   error_growth_options more = options.error;

@@ -11,8 +11,8 @@
 /// The verdict. Each held-out view gives the candidate's gain in PSNR over the first trial. The noise is the standard
 /// error of their mean. A candidate is taken where its gain exceeds the noise and least_gain. Gains nearly add up
 /// (bench/results/trial_candidates.json), so all such candidates are taken together. A claim would need twice the
-/// noise; here a wrong choice costs the same either way. Exposures are taken unless they lose more than three
-/// times the noise. A short trial visits each photograph too few times for its twelve numbers to settle. So it shows
+/// noise; here a wrong choice costs the same either way. Exposures are taken unless they lose more than
+/// twice the noise. A short trial visits each photograph too few times for its twelve numbers to settle. So it shows
 /// them worse than a whole run does. The trials of bonsai and many_cameras lose 0.1 and 0.3 dB, and their runs gain 0.3
 /// and 0.9 (bench/results/exposure_rates.json, chosen_full.json).
 ///
