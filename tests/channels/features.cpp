@@ -1,6 +1,7 @@
 // N features of rays, and their gradients: against a tracer in double and its central differences, at the seams of the
 // chunks that they are summed in.
 #include <rays/sweep.hpp>
+#include <support/refused.hpp>
 
 using namespace gart_test;
 using gart::gradient_form;
@@ -37,11 +38,6 @@ double off(std::vector<float> const& got, std::vector<double> const& expected) {
   REQUIRE(got.size() == expected.size());
   for (std::size_t i = 0; i < got.size(); ++i) c.add(double{got[i]}, expected[i]);
   return c.relative();
-}
-
-template <class F>
-void refused(F&& call, char const* what) {
-  CHECK_THROWS_WITH_AS(call(), doctest::Contains(what), gart::invalid_argument);
 }
 
 }  // namespace

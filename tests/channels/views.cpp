@@ -4,6 +4,7 @@
 #include <gart/runtime/renderer.hpp>
 
 #include <rays/view_rays.hpp>
+#include <support/refused.hpp>
 
 #include <cmath>
 #include <utility>
@@ -38,11 +39,6 @@ double difference(std::vector<float> const& a, std::vector<float> const& b) {
   for (std::size_t i = 0; i < a.size(); ++i)
     error += double{a[i] - b[i]} * double{a[i] - b[i]}, norm += double{b[i]} * double{b[i]};
   return std::sqrt(error / norm);
-}
-
-template <class F>
-void refused(F&& call, char const* what) {
-  CHECK_THROWS_WITH_AS(call(), doctest::Contains(what), gart::invalid_argument);
 }
 
 }  // namespace

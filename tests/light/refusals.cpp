@@ -4,17 +4,13 @@
 #include <gart/runtime/path_renderer.hpp>
 
 #include <light/small_scenes.hpp>
+#include <support/refused.hpp>
 
 #include <limits>
 
 using namespace gart_test;
 
 namespace {
-
-template <class F>
-void refused(F&& call, char const* what) {
-  CHECK_THROWS_WITH_AS(call(), doctest::Contains(what), gart::invalid_argument);
-}
 
 light::scene sound() {
   light::scene s;

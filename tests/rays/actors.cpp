@@ -5,7 +5,9 @@
 #include <gart/rays/lidar.hpp>
 
 #include <rays/double_scene.hpp>
+#include <rays/placed_models.hpp>
 #include <rays/sweep.hpp>
+#include <support/refused.hpp>
 
 #include <array>
 #include <limits>
@@ -110,24 +112,6 @@ struct moving_scene {
   }
   std::size_t keys() const { return 6; }
 };
-
-template <class E>
-struct placed_models {
-  std::vector<gart::gaussians<E>> memory;
-  placed_models(E& exec, std::vector<gart::gaussian_model> const& models) {
-    for (auto const& m : models) memory.emplace_back(exec, m);
-  }
-  std::vector<gart::gaussians_view<float const>> views() const {
-    std::vector<gart::gaussians_view<float const>> out;
-    for (auto const& m : memory) out.push_back(m.view());
-    return out;
-  }
-};
-
-template <class F>
-void refused(F&& call, char const* what) {
-  CHECK_THROWS_WITH_AS(call(), doctest::Contains(what), gart::invalid_argument);
-}
 
 template <class E>
 gart::traced_rays trace_all(E& exec, gart::actor_tracer<E>& tracer, gart::ray_batch const& rays,
@@ -306,14 +290,7 @@ TEST_CASE_TEMPLATE("gradients of actors are differences of models, keys and rays
     }
     return see(scene_of(models, poses, unmoved), r, s.weights(i), sweep_options());
   };
-  auto const loss = [&] {
-    seen all;
-    for (std::size_t i = 0; i < s.count(); ++i) {
-      seen const one = of_ray(i, s.ray(i));
-      all.loss += one.loss, all.branches = (all.branches ^ one.branches) * 0xff51afd7ed558ccdu;
-    }
-    return all;
-  };
+  auto const loss = [&] { return see_all(s, [&](std::size_t i) { return of_ray(i, s.ray(i)); }); };
   // What is differentiated is what was shown.
   gart::traced_rays const shown = trace_all(exec, tracer, rays, sweep_options());
   double total = 0;

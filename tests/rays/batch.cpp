@@ -1,6 +1,7 @@
 // What a batch of rays sees: the image's numbers where they are an image's rays, what hit lists say where they are not;
 // and what is refused.
 #include <rays/view_rays.hpp>
+#include <support/refused.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -11,15 +12,6 @@
 using namespace gart_test;
 using gart::index_t;
 using gart::u32;
-
-namespace {
-
-template <class F>
-void refused(F&& call, char const* what) {
-  CHECK_THROWS_WITH_AS(call(), doctest::Contains(what), gart::invalid_argument);
-}
-
-}  // namespace
 
 TEST_CASE_TEMPLATE("the rays of a view as a batch see the view", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();

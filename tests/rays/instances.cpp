@@ -3,7 +3,9 @@
 #include <gart/instances/instance_set.hpp>
 
 #include <rays/double_scene.hpp>
+#include <rays/placed_models.hpp>
 #include <rays/sweep.hpp>
+#include <support/refused.hpp>
 
 #include <algorithm>
 #include <array>
@@ -36,23 +38,12 @@ struct actors {
 
 template <class E>
 struct placed_actors {
-  std::vector<gart::gaussians<E>> models;
+  placed_models<E> models;
   gart::instance_set<E> set;
-  placed_actors(E& exec, actors const& a, int degree = 3) : set(exec, degree) {
-    for (auto const& m : a.models) models.emplace_back(exec, m);
-    set.set(views(), a.instances);
-  }
-  std::vector<gart::gaussians_view<float const>> views() const {
-    std::vector<gart::gaussians_view<float const>> out;
-    for (auto const& m : models) out.push_back(m.view());
-    return out;
+  placed_actors(E& exec, actors const& a, int degree = 3) : models(exec, a.models), set(exec, degree) {
+    set.set(models.views(), a.instances);
   }
 };
-
-template <class F>
-void refused(F&& call, char const* what) {
-  CHECK_THROWS_WITH_AS(call(), doctest::Contains(what), gart::invalid_argument);
-}
 
 }  // namespace
 
@@ -145,12 +136,7 @@ TEST_CASE_TEMPLATE("gradients of instances are differences of models and poses",
   std::vector<std::array<double, 6>> moved(a.instances.size(), std::array<double, 6>{});
   auto const loss = [&] {
     double_model const scene = scene_of(models, a.instances, moved);
-    seen all;
-    for (std::size_t i = 0; i < s.count(); ++i) {
-      seen const one = see(scene, s.ray(i), s.weights(i), sweep_options());
-      all.loss += one.loss, all.branches = (all.branches ^ one.branches) * 0xff51afd7ed558ccdu;
-    }
-    return all;
+    return see_all(s, [&](std::size_t i) { return see(scene, s.ray(i), s.weights(i), sweep_options()); });
   };
   // What is differentiated is what was shown.
   target_memory<E> out(exec, s.count());
@@ -252,9 +238,9 @@ TEST_CASE_TEMPLATE("instances move, and those at rest keep their bits", E, GART_
 
   // At the origin an instance is its model, bit for bit.
   gart::instance_set<E> alone(exec, 3);
-  alone.set({placed.models[0].view()}, {{}});
+  alone.set({placed.models.memory[0].view()}, {{}});
   gart::ray_tracer<E> of_model(exec), of_instance(exec);
-  of_model.set_scene(placed.models[0].view(), 3), of_instance.set_scene(alone.scene(), 3);
+  of_model.set_scene(placed.models.memory[0].view(), 3), of_instance.set_scene(alone.scene(), 3);
   CHECK(same(trace_all(exec, of_instance, batch.rays(), {}), trace_all(exec, of_model, batch.rays(), {})));
 
   // There and back, by refits of the tree and by new ones; and what a new set makes of the same poses.
@@ -278,7 +264,7 @@ TEST_CASE_TEMPLATE("instances move, and those at rest keep their bits", E, GART_
 
   // What is written to a model counts from place_all on.
   for (auto& x : a.models[1].opacity) x -= 0.5f;
-  placed.models[1].assign(a.models[1]);
+  placed.models.memory[1].assign(a.models[1]);
   placed.set.place_all();
   tracer.set_scene(placed.set.scene(), 3);
   CHECK(!same(trace_all(exec, tracer, batch.rays(), {}), before));
@@ -301,7 +287,7 @@ TEST_CASE_TEMPLATE("features of instances are shown and have gradients", E, GART
     index_t const count = static_cast<index_t>(a.models[m].size());
     given.push_back({values[m].data(), count, 2}), wanted.push_back({by_values[m].data(), count, 2});
   }
-  placed.set.set(placed.views(), a.instances, given);
+  placed.set.set(placed.models.views(), a.instances, given);
   gart::feature_view<float const> const features = placed.set.features();
   REQUIRE(features.count == 2 * 20 + 2 * 15);
   std::vector<float> shown(features.size());
@@ -331,9 +317,9 @@ TEST_CASE_TEMPLATE("instances that are none are refused by number", E, GART_TEST
   auto const set = [&](auto&& change) {
     std::vector<instance> list = a.instances;
     change(list);
-    placed.set.set(placed.views(), list);
+    placed.set.set(placed.models.views(), list);
   };
-  refused([&] { placed.set.set(placed.views(), {}); }, "instances: there are none");
+  refused([&] { placed.set.set(placed.models.views(), {}); }, "instances: there are none");
   refused([&] { set([](auto& list) { list[2].model = 2; }); }, "instances[2].model is 2, and there are 2 models");
   refused([&] { set([&](auto& list) { list[1].position.y = nan; }); }, "instances[1].position is not finite");
   refused([&] { set([&](auto& list) { list[3].rotation[0].y = nan; }); }, "instances[3].rotation is none");
@@ -348,9 +334,10 @@ TEST_CASE_TEMPLATE("instances that are none are refused by number", E, GART_TEST
         placed.set.move(list);
       },
       "instances[1] is of another model");
-  refused([&] { gart::instance_set<E>(exec, 2).set(placed.views(), a.instances); }, "models[0] is of SH degree 3");
+  refused([&] { gart::instance_set<E>(exec, 2).set(placed.models.views(), a.instances); },
+          "models[0] is of SH degree 3");
   refused([&] { gart::instance_set<E>(exec, 4); }, "SH degree is 4");
-  refused([&] { placed.set.set(placed.views(), a.instances, {{nullptr, 8, 3}}); }, "features of 1 models");
+  refused([&] { placed.set.set(placed.models.views(), a.instances, {{nullptr, 8, 3}}); }, "features of 1 models");
   gart::gaussians<E> scene(exec, placed.set.scene().count, 3), fewer(exec, 3, 3);
   refused([&] { placed.set.backward(std::as_const(fewer).view(), {}); }, "number and the SH degree of the scene's");
   std::vector<gart::gaussians_view<float>> const one{fewer.view()}, two{fewer.view(), fewer.view()};

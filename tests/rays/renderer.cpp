@@ -6,6 +6,7 @@
 #include <gart/runtime/renderer.hpp>
 
 #include <rays/view_rays.hpp>
+#include <support/refused.hpp>
 
 #include <algorithm>
 #include <utility>
@@ -57,11 +58,6 @@ gart::output_gradients by_image(gart::span<float const> color, gart::span<float 
   gart::output_gradients by;
   by.color = color, by.depth = depth;
   return by;
-}
-
-template <class F>
-void refused(F&& call, char const* what) {
-  CHECK_THROWS_WITH_AS(call(), doctest::Contains(what), gart::invalid_argument);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gart/runtime/renderer.hpp>
 
 #include <rays/view_rays.hpp>
+#include <support/refused.hpp>
 
 #include <cmath>
 #include <thread>
@@ -59,11 +60,6 @@ bool alike(sweep_of_a_thread const& a, sweep_of_a_thread const& b) {
   return same(a.seen, b.seen) && a.seen.features == b.seen.features && a.hits.ids == b.hits.ids &&
          a.hits.t == b.hits.t && a.view.color.data == b.view.color.data && a.gradients.mean == b.gradients.mean &&
          a.gradients.sh == b.gradients.sh;
-}
-
-template <class F>
-void refused(F&& call, char const* what) {
-  CHECK_THROWS_WITH_AS(call(), doctest::Contains(what), gart::invalid_argument);
 }
 
 }  // namespace

@@ -110,17 +110,21 @@ bool slope(double& x, F const& loss, double& out) {
   return smooth;
 }
 
+// All rays of a sweep, each seen by f(i).
+template <class F>
+seen see_all(sweep const& s, F const& f) {
+  seen all;
+  for (std::size_t i = 0; i < s.count(); ++i) {
+    seen const one = f(i);
+    all.loss += one.loss, all.branches = (all.branches ^ one.branches) * 0xff51afd7ed558ccdu;
+  }
+  return all;
+}
+
 inline void compare(gart::gaussian_model const& model, sweep const& s, gart::render_options const& options,
                     results const& got) {
   double_model m(model);
-  auto const loss = [&] {
-    seen all;
-    for (std::size_t i = 0; i < s.count(); ++i) {
-      seen const one = see(m, s.ray(i), s.weights(i), options);
-      all.loss += one.loss, all.branches = (all.branches ^ one.branches) * 0xff51afd7ed558ccdu;
-    }
-    return all;
-  };
+  auto const loss = [&] { return see_all(s, [&](std::size_t i) { return see(m, s.ray(i), s.weights(i), options); }); };
   std::size_t used = 0, tried = 0;
   auto const check = [&](std::vector<double>& values, std::vector<float> const& by, char const* what) {
     CAPTURE(what);

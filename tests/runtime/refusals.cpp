@@ -2,9 +2,12 @@
 #include <gart/runtime/renderer.hpp>
 
 #include <support/policies.hpp>
+#include <support/refused.hpp>
 
 #include <utility>
 #include <vector>
+
+using gart_test::refused;
 
 namespace {
 
@@ -31,11 +34,6 @@ gart::camera some_view() {
   view.fx = view.fy = 20, view.cx = 10, view.cy = 8;
   view.position.z = -4;
   return view;
-}
-
-template <class F>
-void refused(F&& call, char const* what) {
-  CHECK_THROWS_WITH_AS(call(), doctest::Contains(what), gart::invalid_argument);
 }
 
 }  // namespace
