@@ -83,17 +83,6 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
         a.options.initial_opacity != 0 ? by_option : start.why);
     say("--init-scale", gart::short_number(start.value.scale), a.options.initial_scale != 0 ? by_option : start.why);
   }
-  gart::train_options const options = train_options_of(a);
-  auto const budget = gart::choose_budget(data, options);
-  if (options.densify != gart::densify_kind::none) say("budget", with_commas(budget.value), budget.why);
-  auto const [sizes, why_sizes] = sizes_in_words(data, options);
-  say("images", sizes, why_sizes);
-  if (options.densify == gart::densify_kind::error && !a.set.has("error.split.offset")) {
-    float const share = gart::split_offset(options.error, options.max_gaussians, traits.pixels);
-    say("--set error.split.offset", gart::short_number(share),
-        budget.value < options.max_gaussians ? "their pixels end growth, and nearer children take more memory"
-                                             : "near children fit their shared pixels");
-  }
   return all;
 }
 
@@ -112,6 +101,7 @@ nlohmann::json measure(train_arguments a, gart::dataset const& data, gart::valid
   std::vector<gart::candidate> candidates;
   if (a.automatic) candidates = gart::default_candidates(gart::inspect(data), options);
   std::erase_if(candidates, [&](gart::candidate const& c) {
+    if (c.shortens) return a.length_given;
     std::string const* const own = option_of(a, c.setting);
     return own ? *own != "auto" : a.set.has(c.setting);
   });
@@ -131,7 +121,7 @@ nlohmann::json measure(train_arguments a, gart::dataset const& data, gart::valid
           {"why", a.automatic ? found.plan.why : "--no-auto: the usual settings"}};
 }
 
-void settle(train_arguments& a, nlohmann::json const& measured, nlohmann::json& chosen) {
+void settle(train_arguments& a, gart::dataset const& data, nlohmann::json const& measured, nlohmann::json& chosen) {
   auto const say = [&](std::string const& what, std::string const& value, std::string const& why) {
     chosen.push_back({{"option", what}, {"value", value}, {"why", why}});
   };
@@ -140,16 +130,35 @@ void settle(train_arguments& a, nlohmann::json const& measured, nlohmann::json& 
     std::string const setting = t["setting"], value = t["value"];
     if (setting.empty()) continue;
     std::string* const own = option_of(a, setting);
+    bool const length = setting == "iterations";
     double const gain = t["gain"];
-    if (t["taken"] && own) *own = value;
-    if (t["taken"] && !own) a.set.set(setting, value);
-    say((own ? "--" : "--set ") + setting + " " + value, t["taken"] ? "taken" : "left",
+    if (t["taken"]) {
+      if (own)
+        *own = value;
+      else if (length)
+        a.options.iterations = std::stoi(value);
+      else
+        a.set.set(setting, value);
+    }
+    say((own || length ? "--" : "--set ") + setting + " " + value, t["taken"] ? "taken" : "left",
         (gain < 0 ? "" : "+") + fixed(gain, 2) + " dB, give or take " + fixed(t["noise"].get<double>(), 2) +
             (t["taken"] && gain <= 0 ? "; a trial shows it worse than a whole run" : ""));
   }
   // Settings that were not measured keep the usual values.
   for (auto const& [own, given] : {std::pair{&a.exposure, "off"}, {&a.vignetting, "off"}, {&a.densify, "error"}})
     if (*own == "auto") *own = given;
+
+  gart::train_options const options = train_options_of(a);
+  auto const budget = gart::choose_budget(data, options);
+  if (options.densify != gart::densify_kind::none) say("budget", with_commas(budget.value), budget.why);
+  auto const [sizes, why_sizes] = sizes_in_words(data, options);
+  say("images", sizes, why_sizes);
+  if (options.densify == gart::densify_kind::error && !a.set.has("error.split.offset")) {
+    float const share = gart::split_offset(options.error, options.max_gaussians, data.training_pixels());
+    say("--set error.split.offset", gart::short_number(share),
+        budget.value < options.max_gaussians ? "their pixels end growth, and nearer children take more memory"
+                                             : "near children fit their shared pixels");
+  }
 }
 
 }  // namespace gart_cli

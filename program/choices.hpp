@@ -25,7 +25,7 @@ nlohmann::json chosen_before(nlohmann::json const& config, nlohmann::json const&
 // Tries settings that the command line leaves open in short trainings (gart/runtime/validation.hpp); returns how, and
 // each trial.
 nlohmann::json measure(train_arguments a, gart::dataset const& data, gart::validation_progress const& progress);
-// Applies the measured settings to `a`, and adds them to the choices.
-void settle(train_arguments& a, nlohmann::json const& measured, nlohmann::json& chosen);
+// Applies the measured settings to `a`, and adds them to the choices, and what follows from them: budget and sizes.
+void settle(train_arguments& a, gart::dataset const& data, nlohmann::json const& measured, nlohmann::json& chosen);
 
 }  // namespace gart_cli

@@ -219,7 +219,9 @@ void add_arguments(CLI::App& train, train_arguments& a) {
 }
 
 void fill_in(CLI::App const& train, train_arguments& a) {
-  if (a.preset == "quick" && train.get_option("--iterations")->count() == 0) a.options.iterations = quick_iterations;
+  bool const by_count = train.get_option("--iterations")->count() > 0;
+  if (a.preset == "quick" && !by_count) a.options.iterations = quick_iterations;
+  a.length_given = by_count || a.preset == "quick" || a.time_budget > 0;
 }
 
 void continue_run(train_arguments& a) {

@@ -40,6 +40,7 @@ struct train_arguments {
   std::string preset = "exact";
   gart::train_options options;  // by the table of fields; "auto" here is open there
   double time_budget = 0;       // seconds of training; 0: none
+  bool length_given = false;    // by --iterations, --preset or --time-budget
   int kernel_degree = 2;
   bool automatic = true;
   int sh_degree = 3;

@@ -48,7 +48,6 @@ void training_run::prepare() {
   if (a_.dataset.empty()) throw usage_error("DATASET is missing (see gart train --help)");
   check_poses();
   configuration_ = gart::resolve(request());  // a missing file is known before images are read
-  course_ = course_of(a_);
   load();
   chosen_ = choose(a_, data_);
   configuration_ = gart::resolve(request());
@@ -61,6 +60,7 @@ void training_run::prepare() {
   }
   eval_background_ = background_color(a_.background);
   if (!a_.resume) measure_capture();
+  course_ = course_of(a_), course_.seconds = measure_seconds_;
   if (!a_.start.empty()) {
     std::error_code not_there;
     if (!a_.resume && fs::equivalent(a_.start, a_.model_file(), not_there)) {
@@ -163,8 +163,8 @@ void training_run::measure_capture() {
     });
   }
   measured_ = nlohmann::json::parse(ranks::agreed_text(measured_.dump()));
-  settle(a_, measured_, chosen_);
-  measure_seconds_ = measuring.seconds(), course_.seconds += measure_seconds_;
+  settle(a_, data_, measured_, chosen_);
+  measure_seconds_ = measuring.seconds();
 }
 
 void training_run::say_choices() {

@@ -78,53 +78,59 @@ struct end_all_on_failure {
   }
 };
 
-// Calls run(i, go_on) for each trial, in turn or in parallel threads. A call of go_on() counts a step, and returns
-// false once `progress` has ended the measurement.
-template <class Run>
-void run_trials(validation_plan const& plan, validation_progress const& progress, Run run) {
-  double const all = static_cast<double>(plan.trials) * (plan.steps + 1);
+// What is told of all trials: the share of their steps that is done.
+struct trial_progress {
+  validation_progress const& tell;
+  std::string const& why;
+  double all;  // steps
   std::atomic<int> asked{0};
   std::atomic<bool> ended{false};
-  auto const report = [&] {
-    if (progress && !progress(std::min(asked / all, 1.0), plan.why)) ended = true;
-  };
-  if (!plan.beside) {
-    for (std::size_t i = 0; i < plan.trials; ++i) {
+
+  void report() {
+    if (tell && !tell(std::min(asked / all, 1.0), why)) ended = true;
+  }
+};
+
+// Calls run(i, go_on) for each of `count` trials, in turn or in parallel threads. A call of go_on() counts a step, and
+// returns false once the caller has ended the measurement.
+template <class Run>
+void run_trials(std::size_t count, bool beside, trial_progress& progress, Run run) {
+  if (!beside) {
+    for (std::size_t i = 0; i < count; ++i) {
       run(i, [&] {
-        ++asked, report();
-        return !ended;
+        ++progress.asked, progress.report();
+        return !progress.ended;
       });
     }
     return;
   }
   std::vector<std::future<void>> trials;
-  for (std::size_t i = 0; i < plan.trials; ++i) {
+  for (std::size_t i = 0; i < count; ++i) {
     trials.push_back(std::async(std::launch::async, [&, i] {
-      end_all_on_failure const guard{ended};
+      end_all_on_failure const guard{progress.ended};
       run(i, [&] {
-        ++asked;
-        return !ended;
+        ++progress.asked;
+        return !progress.ended;
       });
     }));
   }
-  end_all_on_failure const guard{ended};
+  end_all_on_failure const guard{progress.ended};
   for (std::future<void>& t : trials)
-    while (t.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready) report();
+    while (t.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready) progress.report();
   for (std::future<void>& t : trials) t.get();  // throws the error of a trial
 }
 
-// A trial's options: as many Gaussians a pixel as in the run, and all counts of steps shortened alike. Short runs raise
+// A trial's options: as many Gaussians a pixel as in the run, and all counts of steps `shorter` alike. Short runs raise
 // the rate of the bands above the first like those of geometry (optim/schedule.hpp). They raise it at most to the first
 // band's. Otherwise a fast rate would seem to pay. A step has one view, without learned poses or depth. Held-out views
 // have no learned pose, and shrunk ones no depth map.
-train_options of_trial(train_options options, validation_plan const& plan) {
+train_options of_trial(train_options options, validation_plan const& plan, double shorter) {
   int const area = plan.shrink * plan.shrink;
-  double const shorter = static_cast<double>(plan.steps) / options.iterations;
   auto const sooner = [&](int& steps) {
     if (steps > 0) steps = std::max(1, static_cast<int>(std::lround(steps * shorter)));
   };
   options.held_out.insert(options.held_out.end(), plan.held_out.begin(), plan.held_out.end());
-  options.iterations = plan.steps, options.batch = 1;
+  sooner(options.iterations), options.batch = 1;
   options.refine_poses = options.refine_lens = false, options.depth_weight = 0;
   options.max_gaussians = std::max<index_t>(options.max_gaussians / static_cast<index_t>(area), 1);
   options.error.min_gaussians = options.error.min_gaussians / area;
@@ -134,11 +140,77 @@ train_options of_trial(train_options options, validation_plan const& plan) {
   float& rest = options.rates.sh_rest;
   rest = std::max(rest, std::min(rest / static_cast<float>(std::sqrt(shorter)), options.rates.sh_dc));
   for (int* from : {&options.error.from, &options.mcmc.from, &options.adc.from})
-    *from = std::min(*from, plan.steps / 20);
+    *from = std::min(*from, options.iterations / 20);
   for (int* every : {&options.error.every, &options.mcmc.every, &options.adc.every})
-    if (*every > 0) *every = std::clamp(plan.steps / 40, 1, *every);
+    if (*every > 0) *every = std::clamp(options.iterations / 40, 1, *every);
   return options;
 }
+
+// Trials of plan.steps that candidates take: one each, and one or two to compare them with. Those that shorten the run
+// are compared with a long one.
+int cost_of(std::vector<candidate> const& candidates, std::size_t tried) {
+  int usual = 0, shorter = 0;
+  for (std::size_t i = 0; i < tried; ++i) ++(candidates[i].shortens ? shorter : usual);
+  return usual + (usual > 0) + shorter + (shorter > 0 ? validation_plan::long_trial : 0);
+}
+
+// The trials of some candidates against the options that were taken so far, and their verdicts.
+class trial_round {
+ public:
+  trial_round(configuration_request const& request, dataset const& small, trial_progress& progress, validation& result)
+      : request_(request), small_(small), progress_(progress), result_(result) {}
+
+  // `candidates`: not empty. `shorter`: than the run, all counts of steps of the trial that these are compared with.
+  void run(std::vector<candidate> const& candidates, double shorter) {
+    std::vector<train_options> trials{of_trial(result_.options, result_.plan, shorter)};
+    for (candidate const& c : candidates) {
+      train_options changed = result_.options;
+      c.take(changed);
+      trials.push_back(of_trial(changed, result_.plan, shorter));
+    }
+    std::vector<std::vector<double>> const psnr = psnr_of_all(trials);
+    if (psnr[0].empty()) return;
+    if (result_.trials.empty()) result_.trials.push_back({"", "", mean(psnr[0]), 0, 0, true});
+    for (std::size_t i = 0; i < candidates.size(); ++i)
+      if (!psnr[i + 1].empty()) judge(candidates[i], psnr[i + 1], psnr[0]);
+  }
+
+ private:
+  // Of each view held out; none where a trial was ended.
+  std::vector<std::vector<double>> psnr_of_all(std::vector<train_options> const& trials) {
+    std::vector<std::vector<double>> psnr(trials.size());
+    auto const run = [&](std::size_t i, auto const& go_on) {
+      std::unique_ptr<session> const training = make_session(request_, trials[i], small_);
+      while (go_on() && training->steps_done() < trials[i].iterations) training->step();
+      if (training->steps_done() == trials[i].iterations)
+        psnr[i] = psnr_of(*training, small_, result_.plan, result_.options.background);
+    };
+    try {
+      run_trials(trials.size(), result_.plan.beside, progress_, run);
+    } catch (out_of_memory const&) {
+      if (!result_.plan.beside) throw;
+      result_.plan.beside = false;  // one at a time may have room
+      progress_.ended = false;
+      psnr.assign(trials.size(), {});
+      run_trials(trials.size(), false, progress_, run);
+    }
+    return psnr;
+  }
+
+  void judge(candidate const& c, std::vector<double> const& psnr, std::vector<double> const& without) {
+    std::vector<double> gains;
+    for (std::size_t v = 0; v < psnr.size(); ++v) gains.push_back(psnr[v] - without[v]);
+    trial tried{c.setting, c.value, mean(psnr), mean(gains), standard_error(gains)};
+    tried.taken = tried.is_better(c.least_noises);
+    if (tried.taken) c.take(result_.options);
+    result_.trials.push_back(tried);
+  }
+
+  configuration_request const& request_;
+  dataset const& small_;
+  trial_progress& progress_;
+  validation& result_;
+};
 
 }  // namespace
 
@@ -153,6 +225,8 @@ std::vector<candidate> default_candidates(capture_traits const& traits, train_op
   if (options.densify == densify_kind::error &&
       growth_budget(more, most, traits.pixels) > growth_budget(options.error, most, traits.pixels))
     all.push_back({"error.pixels_per_gaussian", "100", [](train_options& o) { o.error.pixels_per_gaussian = 100; }});
+  int const third = options.iterations / validation_plan::long_trial;
+  all.push_back({"iterations", std::to_string(third), [third](train_options& o) { o.iterations = third; }, -2, true});
   return all;
 }
 
@@ -173,75 +247,58 @@ dataset shrunk(dataset const& data, int shrink) {
   return small;
 }
 
-validation_plan plan_validation(train_options const& options, dataset const& data, std::size_t candidates,
-                                bool beside) {
+validation_plan plan_validation(train_options const& options, dataset const& data,
+                                std::vector<candidate> const& candidates, bool beside) {
   validation_plan plan;
   std::size_t const views = data.train.size(), held_out = views / views_for_one;
   if (views > 0) plan.shrink = std::clamp(smallest_side(data) / least_pixels, 1, most_shrink);
   while (!divides(data, plan.shrink)) --plan.shrink;
-  double const steps = run_share / (plan.shrink > 1 ? step_share : 1) * options.iterations;
-  double const each = beside ? beside_share : 1;  // of the time of a trial alone
-  plan.trials = std::min(candidates + 1, static_cast<std::size_t>(steps / fewest_steps / each));
-  if (candidates == 0) {
+  double const share = run_share / (plan.shrink > 1 ? step_share : 1), each = beside ? beside_share : 1;
+  double const steps = share / each * options.iterations;  // of all trials
+  std::size_t tried = candidates.size();
+  while (tried > 0 && cost_of(candidates, tried) * fewest_steps > steps) --tried;
+  if (candidates.empty()) {
     plan.why = "every setting is given";
   } else if (held_out < fewest_held_out) {
     plan.why = std::to_string(views) + " training views are too few to hold some out";
-  } else if (plan.trials < 2) {
+  } else if (tried == 0) {
     plan.why = "a run of " + std::to_string(options.iterations) + " steps is too short to try anything";
   } else {
-    plan.beside = beside;
+    int const cost = cost_of(candidates, tried);
+    auto const end = candidates.begin() + static_cast<std::ptrdiff_t>(tried);
+    auto const shorter =
+        static_cast<std::size_t>(std::count_if(candidates.begin(), end, [](candidate const& c) { return c.shortens; }));
+    plan.beside = beside, plan.tried = tried;
+    plan.trials = tried + (tried > shorter) + (shorter > 0);
     for (std::size_t i = 0; i < held_out; ++i) plan.held_out.push_back(i * views_for_one + views_for_one / 2);
-    plan.steps =
-        std::clamp(static_cast<int>(steps / each / static_cast<double>(plan.trials)), fewest_steps, most_steps);
-    plan.why = std::to_string(plan.trials) + " trials of " + std::to_string(plan.steps) + " steps, judged by " +
-               std::to_string(held_out) + " training views held out";
-    if (plan.trials <= candidates)
-      plan.why += "; the run is too short for " + std::to_string(candidates + 1 - plan.trials) + " more";
+    plan.steps = std::clamp(static_cast<int>(steps / cost), fewest_steps, most_steps);
+    plan.why =
+        std::to_string(plan.trials) + " trials of " + std::to_string(plan.steps) + " steps" +
+        (shorter > 0 ? ", one of them of " + std::to_string(validation_plan::long_trial) + " times as many" : "") +
+        ", judged by " + std::to_string(held_out) + " training views held out";
+    if (tried < candidates.size())
+      plan.why += "; the run is too short for " + std::to_string(candidates.size() - tried) + " more";
   }
-  if (plan.held_out.empty()) plan.trials = 0;
   return plan;
 }
 
 validation validate(configuration_request const& request, train_options const& options, dataset const& data,
                     std::vector<candidate> const& candidates, validation_progress const& progress) {
   bool const beside = !request.stream && resolve(request).backend == backend_kind::cuda;
-  validation result{plan_validation(options, data, candidates.size(), beside), {}, options};
+  validation result{plan_validation(options, data, candidates, beside), {}, options};
   validation_plan const& plan = result.plan;
   if (plan.held_out.empty()) return result;
   dataset const small = shrunk(data, plan.shrink);
   configuration_request alone = request;
   alone.ranks = nullptr, alone.depth = false;
-  std::vector<std::vector<double>> psnr(plan.trials);  // of each view held out; none where a trial was ended
-  auto const run = [&](std::size_t i, auto const& go_on) {
-    train_options changed = options;
-    if (i > 0) candidates[i - 1].take(changed);
-    std::unique_ptr<session> const training = make_session(alone, of_trial(changed, plan), small);
-    while (go_on() && training->steps_done() < plan.steps) training->step();
-    if (training->steps_done() == plan.steps) psnr[i] = psnr_of(*training, small, plan, options.background);
-  };
-  try {
-    run_trials(plan, progress, run);
-  } catch (out_of_memory const&) {
-    if (!plan.beside) throw;
-    result.plan.beside = false;  // one at a time may have room
-    psnr.assign(plan.trials, {});
-    run_trials(plan, progress, run);
-  }
-  for (std::size_t i = 0; i < plan.trials && !psnr[0].empty(); ++i) {
-    if (psnr[i].empty()) continue;
-    trial tried;
-    tried.psnr = mean(psnr[i]), tried.taken = i == 0;
-    if (i > 0) {
-      candidate const& c = candidates[i - 1];
-      tried.setting = c.setting, tried.value = c.value;
-      std::vector<double> gains;
-      for (std::size_t v = 0; v < psnr[i].size(); ++v) gains.push_back(psnr[i][v] - psnr[0][v]);
-      tried.gain = mean(gains), tried.noise = standard_error(gains);
-      tried.taken = tried.is_better(c.least_noises);
-      if (tried.taken) c.take(result.options);
-    }
-    result.trials.push_back(tried);
-  }
+  double const steps = static_cast<double>(plan.steps) * cost_of(candidates, plan.tried);
+  trial_progress told{progress, plan.why, steps + static_cast<double>(plan.trials)};
+  trial_round round(alone, small, told, result);
+  std::vector<candidate> usual, shortening;
+  for (std::size_t i = 0; i < plan.tried; ++i) (candidates[i].shortens ? shortening : usual).push_back(candidates[i]);
+  double const shorter = static_cast<double>(plan.steps) / options.iterations;
+  if (!usual.empty()) round.run(usual, shorter);
+  if (!shortening.empty() && !told.ended) round.run(shortening, validation_plan::long_trial * shorter);
   return result;
 }
 

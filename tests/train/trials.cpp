@@ -2,9 +2,11 @@
 // has failed. The sessions are fakes of a device that may hold so many at a time.
 #include <support/policies.hpp>
 
+#include <gart/runtime/capture_defaults.hpp>
 #include <gart/runtime/registry.hpp>
 #include <gart/runtime/validation.hpp>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <mutex>
@@ -21,12 +23,14 @@ constexpr int unlimited = 1000;
 struct device {
   std::atomic<int> room{unlimited}, alive{0}, most{0}, made{0}, steps{0}, together{1}, failing{unlimited};
   std::atomic<bool> slow{false};
+  std::atomic<float> overfit{0};  // what a trial of more than 2,500 steps loses
   std::mutex guard;
   std::set<std::thread::id> threads;
+  std::vector<int> lengths;  // of trials
 
   void reset(int new_room, int wait_for) {
     room = new_room, together = wait_for, failing = unlimited, slow = false;
-    alive = 0, most = 0, made = 0, steps = 0, threads.clear();
+    alive = 0, most = 0, made = 0, steps = 0, threads.clear(), lengths.clear();
   }
 };
 device& the_device() {
@@ -47,6 +51,7 @@ class fake_session : public gart::session {
     }
     std::lock_guard const lock(d.guard);
     d.threads.insert(std::this_thread::get_id());
+    d.lengths.push_back(options.iterations);
   }
   ~fake_session() override { --the_device().alive; }
 
@@ -69,7 +74,8 @@ class fake_session : public gart::session {
     gart::rendered out;
     out.color = gart::image_float(view.width, view.height, 3);
     // The photographs are grey at 0.5; an exposure helps, vignetting harms.
-    float const off = options_.exposure ? 0.01f : options_.vignetting ? 0.1f : 0.05f;
+    float off = options_.exposure ? 0.01f : options_.vignetting ? 0.1f : 0.05f;
+    if (options_.iterations > 2500) off += the_device().overfit;
     for (float& v : out.color.data) v = 0.5f + off + 0.0001f * static_cast<float>(view.fx);
     return out;
   }
@@ -213,4 +219,35 @@ TEST_CASE("progress is told between parallel steps, and may end them") {
   CHECK(ended.trials.empty());
   CHECK(!ended.options.exposure);
   CHECK(d.alive == 0);
+}
+
+TEST_CASE("a third of the steps is tried last, against a long trial") {
+  device& d = the_device();
+  gart::train_options options;
+  options.random_points = 10;
+  auto const length = gart::default_candidates({}, options).back();
+  std::vector<gart::candidate> const candidates{{"exposure", "on", [](gart::train_options& o) { o.exposure = true; }},
+                                                length};
+  for (float const overfit : {-0.005f, 0.0f, 0.005f}) {
+    CAPTURE(overfit);
+    d.reset(unlimited, 2);
+    d.overfit = overfit;
+    auto const found = gart::validate(fake_request(), options, grey(), candidates);
+    d.overfit = 0;
+    CHECK(found.plan.trials == 4);
+    REQUIRE(found.trials.size() == 3);
+    CHECK(found.options.exposure);
+    CHECK(found.trials[2].setting == "iterations");
+    CHECK(found.trials[2].taken == (overfit >= 0));  // as good is enough
+    CHECK(found.options.iterations == (overfit >= 0 ? 10000 : 30000));
+    REQUIRE(d.lengths.size() == 4);
+    std::sort(d.lengths.begin() + 2, d.lengths.end());
+    CHECK(d.lengths == std::vector<int>{found.plan.steps, found.plan.steps, found.plan.steps, 3 * found.plan.steps});
+  }
+  // Alone, it has no other trial.
+  d.reset(unlimited, 2);
+  auto const alone = gart::validate(fake_request(), options, grey(), {length});
+  CHECK(alone.plan.trials == 2);
+  CHECK(alone.trials.size() == 2);
+  CHECK(d.lengths.size() == 2);
 }

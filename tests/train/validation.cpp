@@ -68,6 +68,9 @@ gart::train_options options() {
 }
 
 std::vector<gart::candidate> exposures() { return {gart::default_candidates({}, {}).front()}; }
+std::vector<gart::candidate> some(std::size_t count) {
+  return std::vector<gart::candidate>(count, {"vignetting", "on", [](gart::train_options& o) { o.vignetting = true; }});
+}
 
 }  // namespace
 
@@ -93,7 +96,7 @@ TEST_CASE("held-out training views decide, test views do not") {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   auto const data = capture(seed, false, false);
-  auto const plan = gart::plan_validation(options(), data, 1);
+  auto const plan = gart::plan_validation(options(), data, some(1));
   CHECK(plan.held_out == std::vector<std::size_t>{2, 6, 10, 14, 18, 22, 26, 30, 34, 38, 42, 46});
   CHECK(plan.trials == 2);
   CHECK(plan.shrink == 1);
@@ -123,7 +126,7 @@ TEST_CASE("trials take a tenth of a run, or are not made") {
   data.train.resize(40);
   for (auto& v : data.train) v.view.width = 1000, v.view.height = 600;
   gart::train_options of;
-  auto const plan = gart::plan_validation(of, data, 5);
+  auto const plan = gart::plan_validation(of, data, some(5));
   CHECK(plan.trials == 6);
   CHECK(plan.steps == 1250);
   CHECK(plan.why.find("too short for") == std::string::npos);
@@ -132,24 +135,35 @@ TEST_CASE("trials take a tenth of a run, or are not made") {
   for (int const iterations : {1, 5599, 5600, 7000, 15000, 30000, 1000000}) {
     CAPTURE(iterations);
     of.iterations = iterations;
-    auto const p = gart::plan_validation(of, data, 5);
+    auto const p = gart::plan_validation(of, data, some(5));
     CHECK(static_cast<double>(p.trials) * p.steps <= 0.25 * iterations);
     CHECK((p.trials > 0) == (iterations >= 5600));
     CHECK(p.held_out.empty() == (p.trials == 0));
     CHECK_FALSE(p.why.empty());
   }
   data.train[7].view.height = 300;  // the smallest decides
-  CHECK(gart::plan_validation(of, data, 5).shrink == 2);
+  CHECK(gart::plan_validation(of, data, some(5)).shrink == 2);
   data.train[8].view.height = 200;  // images that cannot be smaller cost as much as the run's
   of.iterations = 30000;
-  CHECK(gart::plan_validation(of, data, 5).shrink == 1);
-  CHECK(gart::plan_validation(of, data, 5).trials == 4);
-  CHECK(gart::plan_validation(of, data, 5).why.find("too short for 2 more") != std::string::npos);
-  auto const beside = gart::plan_validation(of, data, 5, true);  // they fill each other's gaps
+  CHECK(gart::plan_validation(of, data, some(5)).shrink == 1);
+  CHECK(gart::plan_validation(of, data, some(5)).trials == 4);
+  CHECK(gart::plan_validation(of, data, some(5)).why.find("too short for 2 more") != std::string::npos);
+  auto const beside = gart::plan_validation(of, data, some(5), true);  // they fill each other's gaps
   CHECK(beside.trials == 6);
   CHECK(beside.steps > plan.steps / 2);
+  // A shorter run is compared with a trial three times as long.
+  data.train[7].view.height = data.train[8].view.height = 600;
+  auto with_length = some(4);
+  with_length.push_back(gart::default_candidates({}, of).back());
+  REQUIRE(with_length.back().shortens);
+  auto const length = gart::plan_validation(of, data, with_length);
+  CHECK(length.trials == 7);
+  CHECK(length.steps == 833);  // 9 times that
+  CHECK(length.why.find("one of them of 3 times as many") != std::string::npos);
+  of.iterations = 15000;
+  CHECK(gart::plan_validation(of, data, with_length).trials == 5);
   data.train.resize(11);
-  CHECK(gart::plan_validation(of, data, 5).trials == 0);
+  CHECK(gart::plan_validation(of, data, some(5)).trials == 0);
   CHECK(gart::validate(serial, of, data, {}).trials.empty());
 }
 
@@ -185,7 +199,9 @@ TEST_CASE("what changes nothing of a run is no candidate") {
   CHECK(has("error.pixels_per_gaussian"));
   of.densify = gart::densify_kind::mcmc;
   CHECK(!has("error.pixels_per_gaussian"));
+  CHECK(gart::default_candidates(traits, of).back().shortens);
   for (auto const& c : gart::default_candidates({}, {})) c.take(of);
+  CHECK(of.iterations == 10000);
   CHECK(of.exposure);
   CHECK(of.vignetting);
 }

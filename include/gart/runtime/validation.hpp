@@ -16,6 +16,10 @@
 /// them worse than a whole run does. The trials of bonsai and many_cameras lose 0.1 and 0.3 dB, and their runs gain 0.3
 /// and 0.9 (bench/results/exposure_rates.json, chosen_full.json).
 ///
+/// The length. Long runs overfit few photographs. So a third of the steps is tried last, with all that was taken,
+/// against a trial three times as long. It is taken unless it loses more than twice the noise: small images overfit
+/// less than a run's, so trials show it worse than a whole run does (bench/results/run_length.json).
+///
 /// Cost: about a tenth of a run's time (plan_validation), more where the run's own images are small. Trials have a
 /// fixed number of steps: on the serial policy the choice does not depend on the machine's load. On a GPU the trials
 /// run in parallel, one thread and stream each. With the caller's stream, or where memory ends, they run one after
@@ -40,33 +44,38 @@ struct candidate {
   std::string value;                         ///< in words, as `gart train` takes it
   std::function<void(train_options&)> take;  ///< sets it
   double least_noises = 1;                   ///< noises of its gain that the gain must exceed (trial::is_better)
+  bool shortens = false;                     ///< it makes the run shorter: tried after the others
 };
 
 /// The candidates that pay on some captures and cost on others, most useful first. Candidates without effect on this
 /// capture are left out. Images of the whole sphere have no vignetting, and some budgets do not depend on pixels.
+/// Those that shorten the run are last.
 std::vector<candidate> default_candidates(capture_traits const& traits, train_options const& options);
 
 /// How candidates are tried.
 struct validation_plan {
   std::vector<std::size_t> held_out = {};  ///< training views by index; empty: nothing is measured
   int shrink = 1;                          ///< pixels of a photograph to one of a trial's image, across and down
-  int steps = 0;                           ///< of each trial
-  std::size_t trials = 0;                  ///< the first, with the caller's options, and one for each candidate
+  int steps = 0;                           ///< of each trial; those that stand for a longer run have long_trial times
+  std::size_t tried = 0;                   ///< candidates, the first of the list
+  std::size_t trials = 0;                  ///< one for each of these, and one or two to compare them with
   bool beside = false;                     ///< in parallel, each on a stream of its own
   std::string why;                         ///< in words
+
+  static constexpr int long_trial = 3;
 };
 
-/// A plan for at most so many candidates. A short run tries fewer. A run that is too short, or has too few training
-/// views, tries none. `beside`: trials may run in parallel.
-validation_plan plan_validation(train_options const& options, dataset const& data, std::size_t candidates,
-                                bool beside = false);
+/// A plan for the first of the candidates, those that shorten the run last. A short run tries fewer. A run that is too
+/// short, or has too few training views, tries none. `beside`: trials may run in parallel.
+validation_plan plan_validation(train_options const& options, dataset const& data,
+                                std::vector<candidate> const& candidates, bool beside = false);
 
 /// The result of a trial.
 struct trial {
   std::string setting;  ///< the candidate's; empty: the options as they came
   std::string value;    ///< the candidate's
   double psnr = 0;      ///< dB, the mean of the views held out
-  double gain = 0;      ///< dB, over the first trial
+  double gain = 0;      ///< dB, over the trial that it is compared with, the first or the long one
   double noise = 0;     ///< dB, the gain's standard error over the views held out
   bool taken = false;   ///< whether the options have it
 
@@ -78,7 +87,7 @@ struct trial {
 /// The result of all trials.
 struct validation {
   validation_plan plan;       ///< how
-  std::vector<trial> trials;  ///< in order
+  std::vector<trial> trials;  ///< the first, and one for each candidate
   train_options options;      ///< the options with the taken candidates
 };
 
