@@ -45,7 +45,8 @@ struct option_field {
 
 /// All of them, in the order of the help.
 inline constexpr option_field option_fields[] = {
-    {GART_FIELD(iterations), 1, 1e9, "Training", "Steps, one training view each"},
+    {GART_FIELD(iterations), 1, 1e9, "Training",
+     "Steps, one training view each; where none are given,\ntrials may choose a third"},
     {GART_FIELD(max_gaussians), 1, 4294967295.0, "Training",
      "Gaussians at most; memory and time grow with them. Growth by\nerror ends at one for each 200 training pixels "
      "where that is\nless (and over 100,000)"},
