@@ -7,8 +7,8 @@ runs the other's, and its images are black, or it crashes.
 
 A program trains with the templates of the README (every method, SH 3) beside every configuration of
 make_renderer and make_session. By default: the library that was built here, and one for another instruction set;
-consumers for none, x86-64-v3 and native at -O0, and at -O2 those that are no library's, and nvcc's host code, where
-there is an nvcc; the linker finding the library first, and last.
+consumers for none and native at -O0, and one at -O2: nvcc's host code, or that for none where there is no nvcc; the
+linker finding the library first, and last.
 GART_TEST_ALL_INSTRUCTION_SETS=1 takes every pair of {none, x86-64-v3, native} at both levels, and SH 0 to 3. One thread,
 because then the sums have one order.
 
@@ -95,7 +95,7 @@ with tempfile.TemporaryDirectory() as temporary:
     folder = pathlib.Path(temporary)
     own = (a.march.removeprefix("-march=") or "none")
     libraries = [own] + [s for s in ("x86-64-v3", "native", "none") if s != own][:2 if every else 1]
-    consumers = ["none", "x86-64-v3", "native"] + (["nvcc"] if a.nvcc else [])
+    consumers = ["none"] + (["x86-64-v3"] if every else []) + ["native"] + (["nvcc"] if a.nvcc else [])
 
     run(a.cmake, "--install", a.build, "--prefix", folder / own)
     for library in libraries[1:]:
@@ -123,7 +123,7 @@ with tempfile.TemporaryDirectory() as temporary:
         f"-DLIBRARIES={';'.join(str(path) for path in archives.values())}", f"-DCMAKE_CUDA_COMPILER={a.nvcc or ''}",
         f"-DCMAKE_CXX_FLAGS={'-fsanitize=address,undefined -fno-sanitize-recover=undefined' if a.sanitize else ''}")
     objects = [f"{c}_O{level}" for c in consumers for level in (0, 2)
-               if (c != "nvcc" if level == 0 else every or c not in libraries)]
+               if (c != "nvcc" if level == 0 else every or c == ("nvcc" if a.nvcc else "none"))]
     programs = [f"templates_alone_{o}" for o in objects] + [f"library_alone_{l}" for l in libraries]
     both = [(l, o, f"both_{l}_{o}_{order}") for l in libraries for o in objects
             for order in ("library_first", "objects_first")]
