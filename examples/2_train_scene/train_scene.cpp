@@ -19,7 +19,7 @@ int main(int argc, char** argv) try {
   // Background, exposures and the like as they suit the capture; what should be otherwise is set after this.
   auto const use = gart::recommended(options, data);
   auto const training = gart::make_session(use.request, use.options, data);
-  while (training->steps_done() < options.iterations) {
+  while (training->steps_done() < use.options.iterations) {
     gart::step_report const done = training->step();
     if (done.step % 100 == 0)
       std::printf("%5d  loss %.4f  psnr %.2f dB  %u Gaussians\n", done.step, done.loss, done.psnr, done.gaussians);

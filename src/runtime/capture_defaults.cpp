@@ -157,13 +157,14 @@ recommendation recommended(train_options const& options, dataset const& data, co
   auto const is_given = [&](std::string const& setting) {
     return std::find(given.begin(), given.end(), setting) != given.end();
   };
+  bool const length_given = options.iterations != train_options{}.iterations;
   recommendation all{request, options, {}};
   if (request.tracer == tracer_kind::automatic) all.request.tracer = choose_tracer(traits).value;
   if (request.backward == "auto") all.request.backward = choose_backward(traits).value;
   if (!is_given("background")) all.options.background = choose_background(traits).value;
   std::vector<candidate> candidates;
   for (candidate& c : default_candidates(traits, options))
-    if (!is_given(c.setting)) candidates.push_back(std::move(c));
+    if (!is_given(c.setting) && !(c.shortens && length_given)) candidates.push_back(std::move(c));
   all.measured = validate(all.request, all.options, data, candidates, progress);
   all.options = all.measured.options;
   return all;

@@ -154,6 +154,30 @@ TEST_CASE("given options are not measured; --no-auto takes the usual") {
   CHECK(here.json("run/config.json")["options"]["exposure"] == "on");
 }
 
+TEST_CASE("a run whose length nobody gives is as long as its trials say") {
+  folder const here;
+  write_capture(here / "capture", 24);
+  fill_images(here / "capture", false);
+  std::string const run =
+      "train capture --exposure off --vignetting off --set rates.sh_rest=1e-3 --max-gaussians 30 --backend serial "
+      "--stop-at 1 --out run ";
+  auto const config_of = [&](std::string const& more) {
+    auto const made = here.gart(run + more);
+    REQUIRE_MESSAGE(made.code == 130, made.err);
+    return here.json("run/config.json");
+  };
+  auto const config = config_of("");
+  auto const& trials = config["measured"]["trials"];
+  REQUIRE(trials.size() == 2);
+  CHECK(trials[1]["setting"] == "iterations");
+  CHECK(trials[1]["value"] == "10000");
+  CHECK(config["options"]["iterations"] == (trials[1]["taken"] ? 10000 : 30000));
+  for (char const* const given : {"--preset quick", "--time-budget 100", "--iterations 30000"}) {
+    CAPTURE(given);
+    CHECK(config_of(given)["measured"]["trials"].empty());
+  }
+}
+
 TEST_CASE("a run from before the penalty on bands keeps its rates") {
   folder const here;
   write_capture(here / "capture");

@@ -77,7 +77,7 @@ struct recommendation {
   validation measured;            ///< the trials behind them
 };
 /// Fills in what `request` leaves open, the background, and the default candidates. Settings named in `given` stay as
-/// they are. Cost: O(pixels), and the trials.
+/// they are, and so does a number of iterations other than the usual. Cost: O(pixels), and the trials.
 recommendation recommended(train_options const& options, dataset const& data, configuration_request const& request = {},
                            std::vector<std::string> const& given = {}, validation_progress const& progress = {});
 
