@@ -9,9 +9,9 @@
 /// Also 240 bytes a piece of 32 hits at SH degree 3. The host reads how many pieces there are.
 
 #include <gart/algorithm/sort_pairs.hpp>
-#include <gart/backward/gather.hpp>
-#include <gart/channels/hit_pieces.hpp>
 #include <gart/rays/batch_gradient.hpp>
+#include <gart/scene/gaussians.hpp>
+#include <gart/trace/lane_values.hpp>
 
 #include <bit>
 
@@ -48,8 +48,6 @@ struct sorted_hits {
 
 namespace ray_kernels {
 
-inline constexpr u32 piece_hits = 32;
-
 // The hits in the order of the rays.
 struct order_by_ray {
   run_reader runs;
@@ -62,58 +60,149 @@ struct order_by_ray {
   }
 };
 
-// Rows are laid out as pair_gradient has them, so that sum_pairs adds them up.
+// A tile of the sorted hits: a warp's. A Gaussian's hits that pass its ends are summed in parts.
+struct hit_tile {
+  static constexpr index_t size = 128;
+  static constexpr u32 none = ~u32{0};
+  index_t first, end;
+  u32 before, after;  // Gaussians that the tile before and the next one share, or none
+
+  GART_HD GART_INLINE hit_tile(u32 const* ids, index_t count, index_t number)
+      : first(number * size), end(count - first < size ? count : first + size) {
+    before = first > 0 && ids[first - 1] == ids[first] ? ids[first] : none;
+    after = end < count && ids[end - 1] == ids[end] ? ids[end] : none;
+  }
+};
+
+// The sums of a Gaussian: three floats a lane. Lanes of the bands have their colours, the others moments.
+struct sum_row {
+  static constexpr int bands = sh_basis<color_rows::most>::size, lanes = bands + moment_stride / 3;
+  float v[3 * lanes];
+};
+// Where they go.
+struct sum_targets {
+  u32 gaussians;
+  int bands;  // of a row of sh
+  float *sh, *moments;
+
+  GART_HD GART_INLINE void write(u32 id, int lane, vec3 const& sum) const {
+    if (lane >= sum_row::bands)
+      put(moments + std::size_t{moment_stride} * id + 3 * (lane - sum_row::bands), sum);
+    else if (lane < bands)
+      put(sh + std::size_t{3} * static_cast<std::size_t>(bands) * id + 3 * lane, sum);
+  }
+  GART_HD GART_INLINE static void put(float* to, vec3 const& v) { to[0] = v.x, to[1] = v.y, to[2] = v.z; }
+};
+
+// Lanes take a hit each and put down what it is made of. Then they take a part of the row each and go through the hits.
+// So all of them work, however many hits a Gaussian has.
 template <class Response, class Owner>
-struct sum_piece {
-  static constexpr int block_size = 64, min_blocks = 8;
-  static constexpr int bands = sh_basis<color_rows::most>::size;
+struct sum_tile {
+  static constexpr int block_size = beam_lanes, min_blocks = 32;
+  static constexpr int bands = sum_row::bands;
   sorted_hits<Owner> hits;
-  u32 const *firsts, *ends;
+  index_t count;
   differentiated_ray const* rays;
   ray_gaussian const* records;
-  int sh_floats, active_floats;  // of a row of gradients; of those the active bands
-  quad* rows;
+  int active_bands;
+  sum_targets out;
+  sum_row* parts;  // [tiles][2]: of a Gaussian that began before, of one that ends after
 
-  GART_KERNEL void operator()(index_t piece) const {
-    u32 const first = firsts[piece], id = hits.ids[first];
-    u32 const end = ends[id] - first < piece_hits ? ends[id] : first + piece_hits;
-    ray_gaussian const gaussian = records[id];
-    float color[3 * bands] = {}, moment[moment_stride] = {};
-    for (u32 k = first; k < end; ++k) add(k, gaussian, color, moment);
-    int const sh_quads = (sh_floats + 3) / 4;
-    quad* const row = rows + static_cast<std::size_t>(piece) * static_cast<std::size_t>(sh_quads + moment_stride / 4);
-    GART_UNROLL
-    for (int q = 0; q < (3 * bands + 3) / 4; ++q)
-      if (q < sh_quads) {
-        quad four;
-        GART_UNROLL
-        for (int i = 0; i < 4; ++i) four.v[i] = 4 * q + i < active_floats ? color[4 * q + i] : 0.0f;
-        row[q] = four;
+  // A lane's share is a factor times three floats: of a band and the colour, or of 1 and moments.
+  struct hit_terms {
+    float factor[bands + 4];
+    quad three[1 + moment_stride / 3];
+  };
+  struct scratch {
+    hit_terms hits[beam_lanes];
+    u32 ids[beam_lanes];
+  };
+
+  GART_KERNEL void operator()(auto const& team) const {
+    scratch& s = team.scratch();
+    hit_tile const tile(hits.ids, count, team.tile());
+    per_lane<vec3> sum;
+    u32 id = hit_tile::none;
+    for (index_t k = tile.first; k < tile.end; k += beam_lanes) {
+      int const n = tile.end - k < beam_lanes ? static_cast<int>(tile.end - k) : beam_lanes;
+      each_lane([&](int l) {
+        if (l < n) s.ids[l] = put(k + static_cast<index_t>(l), s.hits[l]);
+      });
+      team.barrier();
+      for (int j = 0; j < n; ++j) {
+        bool const other = s.ids[j] != id;
+        if (other) write(team.tile(), tile, id, sum), id = s.ids[j];
+        hit_terms const& hit = s.hits[j];
+        each_lane([&](int l) {
+          if (l >= sum_row::lanes) return;
+          float const f = hit.factor[l < bands ? l : bands];
+          quad const three = hit.three[l < bands ? 0 : l - bands + 1];
+          if (other) sum[l] = vec3(0.0f);
+          sum[l] += f * vec3(three.v[0], three.v[1], three.v[2]);
+        });
       }
-    GART_UNROLL
-    for (int q = 0; q < moment_stride / 4; ++q)
-      row[sh_quads + q] = {moment[4 * q], moment[4 * q + 1], moment[4 * q + 2], moment[4 * q + 3]};
+      team.barrier();
+    }
+    write(team.tile(), tile, id, sum);
   }
 
  private:
-  GART_HD GART_INLINE void add(u32 k, ray_gaussian const& gaussian, float (&color)[3 * bands],
-                               float (&moment)[moment_stride]) const {
+  GART_HD GART_INLINE void write(index_t number, hit_tile const& tile, u32 id, per_lane<vec3>& sum) const {
+    if (id >= out.gaussians) return;
+    each_lane([&](int l) {
+      if (l >= sum_row::lanes) return;
+      if (id == tile.before || id == tile.after)
+        out.put(parts[std::size_t{2} * number + (id != tile.before)].v + 3 * l, sum[l]);
+      else
+        out.write(id, l, sum[l]);
+    });
+  }
+  // Of a hit; its Gaussian.
+  GART_HD GART_INLINE u32 put(index_t k, hit_terms& to) const {
+    u32 const id = hits.ids[k];
+    if (id >= out.gaussians) return id;
     u32 const place = hits.places[k];
     hit_entry const entry = hits.entries[place];
     differentiated_ray const from = rays[hits.owner.ray_of(place)];
-    vec3 const c = color_gradient_of(entry, from.by_color);
-    sh_basis<color_rows::most> const basis(from.direction);
-    GART_UNROLL
-    for (int b = 0; b < bands; ++b) {
-      if (3 * b >= active_floats) break;
-      color[3 * b] += basis.y[b] * c.x, color[3 * b + 1] += basis.y[b] * c.y, color[3 * b + 2] += basis.y[b] * c.z;
-    }
+    ray_gaussian const gaussian = records[id];
     ray_peak const r = evaluate(gaussian, from.own());
     float const by_alpha = alpha_gradient_of<Response>(entry, hits.depths[place], from, gaussian, r);
     moments_of<float> const m =
         hit_moments_with_depth<Response>(gaussian, r, by_alpha, entry.weight() * from.by_depth, true);
+    vec3 const c = color_gradient_of(entry, from.by_color);
+    to.three[0] = {{c.x, c.y, c.z, 0}};
     GART_UNROLL
-    for (int i = 0; i < error_place; ++i) moment[i] += m.v[i];
+    for (int i = 0; i < moment_stride; i += 3) to.three[1 + i / 3] = {{m.v[i], m.v[i + 1], m.v[i + 2], 0}};
+    sh_basis<color_rows::most> const basis(from.direction);
+    GART_UNROLL
+    for (int b = 0; b < bands; ++b) to.factor[b] = b < active_bands ? basis.y[b] : 0.0f;
+    to.factor[bands] = 1;
+    return id;
+  }
+};
+
+// A Gaussian that passes the end of a tile: its parts, in order. An index a lane of the tile that it begins in.
+struct join_parts {
+  u32 const* ids;
+  index_t count;
+  sum_row const* parts;
+  sum_targets out;
+  GART_KERNEL void operator()(index_t index) const {
+    index_t number = index / sum_row::lanes;
+    int const lane = static_cast<int>(index % sum_row::lanes);
+    hit_tile const tile(ids, count, number);
+    u32 const id = tile.after;
+    if (id >= out.gaussians || id == tile.before) return;
+    auto const part = [&](std::size_t row) {
+      float const* const v = parts[row].v + 3 * lane;
+      return vec3(v[0], v[1], v[2]);
+    };
+    vec3 sum = part(std::size_t{2} * number + 1);
+    for (bool more = true; more;) {
+      sum += part(std::size_t{2} * ++number);
+      more = hit_tile(ids, count, number).after == id;
+    }
+    out.write(id, lane, sum);
   }
 };
 
@@ -124,7 +213,7 @@ template <execution E, class Response>
 class batch_gather {
  public:
   /// Allocates nothing; `exec` must outlive it.
-  explicit batch_gather(E& exec) : pieces_(exec), rows_(exec) {}
+  explicit batch_gather(E& exec) : parts_(exec) {}
 
   /// Overwrites gradients.sh, and moments, [N][moment_stride]. `records`: the Gaussians in the batch's frame. Sorts
   /// the hits, where they are not.
@@ -144,24 +233,17 @@ class batch_gather {
   template <class Owner>
   void sum(E& exec, sorted_hits<Owner> const& hits, index_t n, span<differentiated_ray const> rays,
            span<ray_gaussian const> records, int active_degree, gaussians_view<float> gradients, span<float> moments) {
-    pieces_.cut(exec, "rays/pieces", channel_kernels::id_of_hit{hits.ids}, n, gradients.count, ray_kernels::piece_hits);
-    index_t const pieces = pieces_.count();
-    int const sh_floats = gradients.sh_stride();
-    rows_.resize(u64{pieces} * static_cast<u64>((sh_floats + 3) / 4 + moment_stride / 4));
-    parallel_for(
-        exec, "rays/gather", pieces,
-        ray_kernels::sum_piece<Response, Owner>{hits, pieces_.firsts(), pieces_.ends(), rays.data(), records.data(),
-                                                sh_floats, 3 * sh_coefficients(active_degree), rows_.data()});
-    switch (gradients.sh_degree) {
-      case 0:
-        return add_up<0>(exec, pieces, gradients, moments);
-      case 1:
-        return add_up<1>(exec, pieces, gradients, moments);
-      case 2:
-        return add_up<2>(exec, pieces, gradients, moments);
-      default:
-        return add_up<3>(exec, pieces, gradients, moments);
-    }
+    ray_kernels::sum_targets const out{gradients.count, sh_coefficients(gradients.sh_degree), gradients.sh,
+                                       moments.data()};
+    exec.zero(out.sh, sizeof(float) * gradients.count * static_cast<std::size_t>(gradients.sh_stride()));
+    exec.zero(out.moments, sizeof(float) * gradients.count * std::size_t{moment_stride});
+    index_t const tiles = n / tile_hits + (n % tile_hits != 0);
+    parts_.resize(std::size_t{2} * tiles);
+    parallel_for(exec, "rays/gather", tile_range{tiles, static_cast<index_t>(beam_lanes)},
+                 ray_kernels::sum_tile<Response, Owner>{
+                     hits, n, rays.data(), records.data(), sh_coefficients(active_degree), out, parts_.data()});
+    parallel_for(exec, "rays/sum", tiles * static_cast<index_t>(ray_kernels::sum_row::lanes),
+                 ray_kernels::join_parts{hits.ids, n, parts_.data(), out});
   }
 
  private:
@@ -174,16 +256,8 @@ class batch_gather {
     sort_pairs(exec, hits.sorted_ids.view(), hits.places.view(), static_cast<int>(std::bit_width(gaussians - 1)));
     hits.sorted = true;
   }
-  template <int Degree>
-  void add_up(E& exec, u64 pieces, gaussians_view<float> gradients, span<float> moments) {
-    parallel_for(
-        exec, "rays/sum", gradients.count * static_cast<index_t>(pair_gradient<Degree>::quads),
-        sum_pairs<Degree, terms<term::color, term::geometry>>{pieces_.offsets().subspan(0, gradients.count), pieces,
-                                                              rows_.data(), gradients.sh, moments.data()});
-  }
-
-  hit_pieces<E> pieces_;
-  buffer<quad, E> rows_;
+  static constexpr index_t tile_hits = ray_kernels::hit_tile::size;
+  buffer<ray_kernels::sum_row, E> parts_;
 };
 
 }}  // namespace gart::GART_ISA
