@@ -87,13 +87,13 @@ kept_by_walk kept_by(bool groups, E& exec, gart::gaussians<E> const& scene, gart
   constexpr std::size_t room = 1u << 19;
   gart::hit_runs<E> runs(exec);
   gart::buffer<gart::u32, E> ids(exec, room);
-  gart::buffer<gart::hit_entry, E> entries(exec, room);
-  gart::buffer<float, E> depths(exec, room);
-  gart::keep_hits<E> const keep{runs.begin(n, room), ids.data(), entries.data(), depths.data()};
+  gart::buffer<gart::kept_hit, E> hits(exec, room);
+  gart::keep_hits<E> const keep{runs.begin(n, room), ids.data(), hits.data()};
   by.walk(groups, gart::batch_composite<gart::keep_hits<E>>{
                       {}, gart::batch_rays(rays), {view.sh, view.sh_degree, view.sh_degree}, options, {}, keep});
-  kept_by_walk out{in_order(runs, ids), {}, in_order(runs, depths), {}, {}};
-  for (gart::hit_entry const& entry : in_order(runs, entries)) out.weights.push_back(entry.w);
+  kept_by_walk out{in_order(runs, ids), {}, {}, {}, {}};
+  for (gart::kept_hit const& hit : in_order(runs, hits))
+    out.depths.push_back(hit.depth), out.weights.push_back(hit.entry.w);
 
   using find = gart::batch_find<E>;
   gart::buffer<typename find::taken_hit, E> found(exec, room);

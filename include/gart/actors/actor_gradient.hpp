@@ -46,10 +46,12 @@ struct move_differentiated {
   }
 };
 
-// Whose an actor's hits are.
-struct ray_of_hit {
+// An actor's hits by place.
+struct picked_hits {
+  hit_entry const* entries;
+  float const* depths;
   u32 const* rays;
-  GART_HD u32 ray_of(u32 place) const { return rays[place]; }
+  GART_HD kept_hit at(u32 place) const { return {entries[place], depths[place], 0, rays[place]}; }
 };
 
 // An actor's hits as those of a batch. The id of one that was not composited is past the last Gaussian.
@@ -230,10 +232,8 @@ class actor_gradient {
                    actor_kernels::pick_hits{hits, to_own, model.count, ids_.data(), places_.data(),
                                             rays_of_hits_.data(), depths_.data()});
       sort_pairs(*exec_, ids_.view(), places_.view(), static_cast<int>(std::bit_width(model.count)));
-      using owner = actor_kernels::ray_of_hit;
-      gather_.sum(*exec_,
-                  sorted_hits<owner>{owner{rays_of_hits_.data()}, ids_.data(), places_.data(), hits.entries + hits.base,
-                                     depths_.data()},
+      actor_kernels::picked_hits const picked{hits.entries + hits.base, depths_.data(), rays_of_hits_.data()};
+      gather_.sum(*exec_, sorted_hits<actor_kernels::picked_hits>{picked, ids_.data(), places_.data()},
                   static_cast<index_t>(count), moved_, records_, model.sh_degree, gradients, moments_);
       finish_gradients(*exec_, model, records_, camera{}, 0, moments_, gradients);
     }

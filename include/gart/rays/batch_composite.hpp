@@ -39,11 +39,12 @@ struct keep_none {
   struct state {};                    ///< nothing
 };
 
-/// What the gradient needs of a hit.
-struct kept_hit {
-  hit_entry entry;  ///< of its colour
-  float depth;      ///< that the ray would have if the hit were opaque
-  u32 id;           ///< the Gaussian
+/// What the gradient needs of a hit. It lies together, since hits are read in another order than they are written.
+struct alignas(32) kept_hit {
+  hit_entry entry;    ///< of its colour
+  float depth;        ///< that the ray would have if the hit were opaque
+  u32 id;             ///< the Gaussian
+  u32 ray_number = 0;  ///< whose it is
 };
 
 /// Keeps what the gradient needs of each hit, for a sum by Gaussian (rays/batch_gather.hpp).
@@ -54,24 +55,23 @@ struct keep_hits {
   using state = typename run_writer<E>::state;  ///< of a ray
   run_writer<E> runs;                           ///< where they go
   u32* ids = nullptr;                           ///< [places]: Gaussians
-  hit_entry* entries = nullptr;                 ///< [places]
-  float* depths = nullptr;                      ///< [places]
+  hit* hits = nullptr;                          ///< [places]
 
   /// Keeps a hit of a ray, that of number k.
   GART_KERNEL GART_INLINE void keep(state& s, index_t ray_number, u32 k, hit const& h) const {
-    runs.put(s, ray_number, k, [&](u64 at) { write(at, h); });
+    runs.put(s, ray_number, k, [&](u64 at) { write(at, ray_number, h); });
   }
   /// Keeps so many hits of a ray from number `first`, a lane each.
   GART_KERNEL GART_INLINE void keep_together(state& s, index_t ray_number, u32 first, u32 count,
-                                             group_values<hit>& hits) const {
-    runs.put_together(s, ray_number, first, count, [&](int l, u64 at) { write(at, hits[l]); });
+                                             group_values<hit>& taken) const {
+    runs.put_together(s, ray_number, first, count, [&](int l, u64 at) { write(at, ray_number, taken[l]); });
   }
   /// After the last one.
-  GART_KERNEL GART_INLINE void end(index_t ray_number, u32 hits) const { runs.counts[ray_number] = hits; }
+  GART_KERNEL GART_INLINE void end(index_t ray_number, u32 count) const { runs.counts[ray_number] = count; }
 
  private:
-  GART_KERNEL GART_INLINE void write(u64 at, hit const& h) const {
-    ids[at] = h.id, entries[at] = h.entry, depths[at] = h.depth;
+  GART_KERNEL GART_INLINE void write(u64 at, index_t ray_number, hit const& h) const {
+    ids[at] = h.id, hits[at] = {h.entry, h.depth, h.id, ray_number};
   }
 };
 

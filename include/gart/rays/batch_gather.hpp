@@ -22,12 +22,11 @@ template <execution E>
 struct kept_batch {
   /// None yet.
   explicit kept_batch(E& exec)
-      : runs(exec), ids(exec), entries(exec), depths(exec), offsets(exec), sorted_ids(exec), places(exec) {}
+      : runs(exec), ids(exec), hits(exec), offsets(exec), sorted_ids(exec), places(exec) {}
 
   hit_runs<E> runs;                   ///< whose the places are
   buffer<u32, E> ids;                 ///< as keep_hits has them
-  buffer<hit_entry, E> entries;       ///< the same
-  buffer<float, E> depths;            ///< the same
+  buffer<kept_hit, E> hits;           ///< the same
   buffer<u64, E> offsets;             ///< [R]: the hits of the rays before
   buffer<u32, E> sorted_ids, places;  ///< by Gaussian, then by ray
   u64 taken = 0;                      ///< places, with those that hold no hit
@@ -35,15 +34,20 @@ struct kept_batch {
   bool sorted = false;                ///< the order by Gaussian is there
 };
 
-/// The hits of rays in the order of their Gaussians. Owner: owner.ray_of(place) is the ray of a place. Trivially
+/// The hits of rays in the order of their Gaussians. Hits: hits.at(place) is the kept_hit of a place. Trivially
 /// copyable.
-template <class Owner>
+template <class Hits>
 struct sorted_hits {
-  Owner owner;                         ///< whose the places are
-  u32 const* ids = nullptr;            ///< [count]: Gaussians in order; past the last one: no hit
-  u32 const* places = nullptr;         ///< [count]: where the hits are
-  hit_entry const* entries = nullptr;  ///< by place
-  float const* depths = nullptr;       ///< by place
+  Hits hits;                    ///< by place
+  u32 const* ids = nullptr;     ///< [count]: Gaussians in order; past the last one: no hit
+  u32 const* places = nullptr;  ///< [count]: where the hits are
+};
+
+/// Those of a batch by place.
+struct batch_hits {
+  kept_hit const* hits = nullptr;  ///< as keep_hits has them
+  /// Of a place.
+  GART_HD GART_INLINE kept_hit at(u32 place) const { return hits[place]; }
 };
 
 namespace ray_kernels {
@@ -96,11 +100,11 @@ struct sum_targets {
 
 // Lanes take a hit each and put down what it is made of. Then they take a part of the row each and go through the hits.
 // So all of them work, however many hits a Gaussian has.
-template <class Response, class Owner>
+template <class Response, class Hits>
 struct sum_tile {
   static constexpr int block_size = beam_lanes, min_blocks = 32;
   static constexpr int bands = sum_row::bands;
-  sorted_hits<Owner> hits;
+  sorted_hits<Hits> hits;
   index_t count;
   differentiated_ray const* rays;
   ray_gaussian const* records;
@@ -161,15 +165,14 @@ struct sum_tile {
   GART_HD GART_INLINE u32 put(index_t k, hit_terms& to) const {
     u32 const id = hits.ids[k];
     if (id >= out.gaussians) return id;
-    u32 const place = hits.places[k];
-    hit_entry const entry = hits.entries[place];
-    differentiated_ray const from = rays[hits.owner.ray_of(place)];
+    kept_hit const hit = hits.hits.at(hits.places[k]);
+    differentiated_ray const from = rays[hit.ray_number];
     ray_gaussian const gaussian = records[id];
     ray_peak const r = evaluate(gaussian, from.own());
-    float const by_alpha = alpha_gradient_of<Response>(entry, hits.depths[place], from, gaussian, r);
+    float const by_alpha = alpha_gradient_of<Response>(hit.entry, hit.depth, from, gaussian, r);
     moments_of<float> const m =
-        hit_moments_with_depth<Response>(gaussian, r, by_alpha, entry.weight() * from.by_depth, true);
-    vec3 const c = color_gradient_of(entry, from.by_color);
+        hit_moments_with_depth<Response>(gaussian, r, by_alpha, hit.entry.weight() * from.by_depth, true);
+    vec3 const c = color_gradient_of(hit.entry, from.by_color);
     to.three[0] = {{c.x, c.y, c.z, 0}};
     GART_UNROLL
     for (int i = 0; i < moment_stride; i += 3) to.three[1 + i / 3] = {{m.v[i], m.v[i + 1], m.v[i + 2], 0}};
@@ -222,16 +225,13 @@ class batch_gather {
     index_t const n = static_cast<index_t>(hits.count);
     if (gradients.count == 0) return;
     sort(exec, hits, n, gradients.count);
-    run_reader const runs = hits.runs.read(hits.offsets.data());
-    sum(exec,
-        sorted_hits<run_reader>{runs, hits.sorted_ids.data(), hits.places.data(), hits.entries.data(),
-                                hits.depths.data()},
-        n, rays, records, active_degree, gradients, moments);
+    sum(exec, sorted_hits<batch_hits>{{hits.hits.data()}, hits.sorted_ids.data(), hits.places.data()}, n, rays,
+        records, active_degree, gradients, moments);
   }
 
   /// The same of n hits that are in order.
-  template <class Owner>
-  void sum(E& exec, sorted_hits<Owner> const& hits, index_t n, span<differentiated_ray const> rays,
+  template <class Hits>
+  void sum(E& exec, sorted_hits<Hits> const& hits, index_t n, span<differentiated_ray const> rays,
            span<ray_gaussian const> records, int active_degree, gaussians_view<float> gradients, span<float> moments) {
     ray_kernels::sum_targets const out{gradients.count, sh_coefficients(gradients.sh_degree), gradients.sh,
                                        moments.data()};
@@ -240,7 +240,7 @@ class batch_gather {
     index_t const tiles = n / tile_hits + (n % tile_hits != 0);
     parts_.resize(std::size_t{2} * tiles);
     parallel_for(exec, "rays/gather", tile_range{tiles, static_cast<index_t>(beam_lanes)},
-                 ray_kernels::sum_tile<Response, Owner>{
+                 ray_kernels::sum_tile<Response, Hits>{
                      hits, n, rays.data(), records.data(), sh_coefficients(active_degree), out, parts_.data()});
     parallel_for(exec, "rays/sum", tiles * static_cast<index_t>(ray_kernels::sum_row::lanes),
                  ray_kernels::join_parts{hits.ids, n, parts_.data(), out});

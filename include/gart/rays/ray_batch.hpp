@@ -89,7 +89,7 @@ struct ray_gradient_targets {
 /// How the gradients of Gaussians are summed. Both are the same sums.
 enum class gradient_form {
   scatter,    ///< each ray is traced again and adds to its Gaussians, atomically: no memory a hit
-  primitive,  ///< hits are written once, sorted by Gaussian and summed there: 32 bytes a hit, the same bits in every
+  primitive,  ///< hits are written once, sorted by Gaussian and summed there: 44 bytes a hit, the same bits in every
               ///< run
 };
 

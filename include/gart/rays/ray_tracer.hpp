@@ -283,18 +283,18 @@ class ray_tracer {
     kept.offsets.resize(n);
     u64 room = hit_runs<E>::room_for(n, per_ray_);
     for (;;) {
-      kept.ids.resize(room), kept.entries.resize(room), kept.depths.resize(room);
+      kept.ids.resize(room), kept.hits.resize(room);
       launch("rays/forward", context.rays,
              composite_of<keep_hits<E>>(
                  context.rays, context.options, out,
-                 {kept.runs.begin(n, room), kept.ids.data(), kept.entries.data(), kept.depths.data()}));
+                 {kept.runs.begin(n, room), kept.ids.data(), kept.hits.data()}));
       exclusive_scan(*exec_, span<u32 const>(kept.runs.counts), kept.offsets.view(),
                      kept.runs.used.view().subspan(1, 1));
       u64 used[2];
       exec_->copy_out(used, kept.runs.used.data(), sizeof used);
       kept.taken = used[0], kept.count = used[1];
       if (kept.taken >= 0xffffffffu)
-        throw out_of_memory("hit", kept.taken * 32, 0,
+        throw out_of_memory("hit", kept.taken * 44, 0,
                             "more than 2^32 hits of a batch: trace fewer rays at a time, or by gradient_form::scatter");
       if (kept.taken <= room) break;
       room = kept.taken;
