@@ -82,6 +82,15 @@ GART_HD GART_INLINE float plane_number(u32 q) {
 #endif
 }
 
+/// That of child c, of the word of a side that has it.
+GART_HD GART_INLINE float plane_in(u32 word, int c) {
+#if defined(__CUDA_ARCH__)
+  return __uint_as_float(__byte_perm(word, 0x3f800000u, 0x7604u | static_cast<u32>(c % 4) << 4));
+#else
+  return plane_number(word >> 8 * (c % 4) & 0xffu);
+#endif
+}
+
 /// A node's grid along a ray. Where the ray enters, it crosses plane q of axis k at plane_number(q) * step[k] +
 /// enter[k]. Where it leaves, at plane_number(q) * step[k] + leave[k]. The two lie apart by more than all roundings of
 /// either. These are a few roundings of the distance to the far end of the grid. On a device there are also 2^-9 of a
@@ -124,8 +133,18 @@ GART_HD GART_INLINE bvh_node load_bounds(bvh_node const& n) {
     out.plane[i / (3 * bvh_width / 4)][i / (bvh_width / 4) % 3][i % (bvh_width / 4)] = float_to_bits(word(4 + i));
   return out;
 }
+/// The same of its grid alone.
+GART_HD GART_INLINE bvh_node load_grid(bvh_node const& n) {
+  quad const head = reinterpret_cast<quad const*>(&n)[0];
+  bvh_node out;
+  GART_UNROLL
+  for (int k = 0; k < 3; ++k) out.origin[k] = head.v[k];
+  out.shape = float_to_bits(head.v[3]);
+  return out;
+}
 #else
 GART_HD GART_INLINE bvh_node const& load_bounds(bvh_node const& n) { return n; }
+GART_HD GART_INLINE bvh_node const& load_grid(bvh_node const& n) { return n; }
 #endif
 
 /// The children that the ray crosses somewhere in [near, far], a bit each. `entry`: where it enters them, at least
@@ -163,21 +182,14 @@ GART_HD GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, flo
       first[k][w] = r.inverse[k] < 0 ? upper : lower, last[k][w] = r.inverse[k] < 0 ? lower : upper;
     }
   }
-  auto const plane = [](u32 const(&side)[bvh_width / 4], int c) {
-#if defined(__CUDA_ARCH__)
-    return __uint_as_float(__byte_perm(side[c / 4], 0x3f800000u, 0x7604u | static_cast<u32>(c % 4) << 4));
-#else
-    return plane_number(side[c / 4] >> 8 * (c % 4) & 0xffu);
-#endif
-  };
   u32 crossed = 0;
   GART_UNROLL
   for (int c = 0; c < bvh_width; ++c) {
     float from = near, to = far;
     GART_UNROLL
     for (int k = 0; k < 3; ++k) {
-      from = larger(plane(first[k], c) * grid.step[k] + grid.enter[k], from);
-      to = smaller(plane(last[k], c) * grid.step[k] + grid.leave[k], to);
+      from = larger(plane_in(first[k][c / 4], c) * grid.step[k] + grid.enter[k], from);
+      to = smaller(plane_in(last[k][c / 4], c) * grid.step[k] + grid.leave[k], to);
     }
     entry[c] = from;
     crossed |= (from <= to ? 1u : 0u) << c;
@@ -199,19 +211,17 @@ GART_HD GART_INLINE float enter_child(bvh_node const& n, int c, slab_ray const& 
   return from;
 }
 
-/// Whether the ray crosses child c somewhere in [near, far], and where it enters it: one of cross_children's.
-GART_HD GART_INLINE bool cross_child(bvh_node const& n, int c, slab_ray const& r, float near, float far, float& entry) {
-  grid_crossing const grid(n, r);
-  float from = near, to = far;
+/// Whether the ray crosses child c somewhere in [near, far], and where it enters it: one of cross_children's. The words
+/// of the sides, an axis each, where rays of this direction enter and leave.
+GART_HD GART_INLINE bool cross_child(grid_crossing const& grid, int c, u32 const (&first)[3], u32 const (&last)[3],
+                                     float near, float far, float& entry) {
+  entry = near;
   GART_UNROLL
   for (int k = 0; k < 3; ++k) {
-    bool const backwards = r.inverse[k] < 0;
-    auto const plane = [&](int side) { return plane_number(reinterpret_cast<u8 const*>(n.plane[side][k])[c]); };
-    from = larger(plane(backwards) * grid.step[k] + grid.enter[k], from);
-    to = smaller(plane(!backwards) * grid.step[k] + grid.leave[k], to);
+    entry = larger(plane_in(first[k], c) * grid.step[k] + grid.enter[k], entry);
+    far = smaller(plane_in(last[k], c) * grid.step[k] + grid.leave[k], far);
   }
-  entry = from;
-  return from <= to;
+  return entry <= far;
 }
 
 }}  // namespace gart::GART_ISA

@@ -114,13 +114,16 @@ struct batch_composite : ray_program_base {
   /// Ray i, in the batch's frame.
   GART_HD ray ray_of(index_t, state const& s) const { return s.own; }
 
-  /// The colour of a Gaussian as the ray sees it, before the clamp.
-  GART_HD GART_INLINE vec3 shade(state const& s, u32 id) const { return colors.unclamped(s.basis, id); }
+  /// The colour of a Gaussian as the ray sees it, before the clamp. Where lanes look up colours for one another, the
+  /// basis is computed anew: it would fill the registers of the walk between.
+  GART_HD GART_INLINE vec3 shade(state const& s, u32 id) const {
+    return colors.unclamped(sh_basis<color_rows::most>(s.own.direction), id);
+  }
   /// Composites a hit. False: the ray ends.
   GART_KERNEL GART_INLINE bool on_hit(state& s, hit const& h) const {
     if (h.t > s.far) return false;
     taken_hit taken;
-    bool const goes_on = take(s, h, shade(s, h.id), taken);
+    bool const goes_on = take(s, h, colors.unclamped(s.basis, h.id), taken);
     if constexpr (Keep::any) keep.keep(s.kept, s.number, s.hits - 1, taken);
     return goes_on;
   }

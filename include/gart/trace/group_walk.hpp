@@ -45,6 +45,7 @@ class grouped_ray {
   using ray_type = typename P::ray_type;
   using hits_type = group_hits<group_memory::hit_room>;
   static constexpr u32 gone = hits_type::gone;
+  static constexpr int side_words = bvh_width / 4;  // of a side of a node
 
  public:
   GART_HD GART_INLINE grouped_ray(Index const& index, traced_scene const& scene, P const& program, group_memory& memory,
@@ -59,7 +60,13 @@ class grouped_ray {
         last_t_(start_of_ray(scene, program, i)),
         end_(end_of_ray(program, i)),
         hits_(memory.hits),
-        alive_(wanted && index.tree.count > 0) {}
+        alive_(wanted && index.tree.count > 0) {
+    each_in_group([&](int l) {
+      u32 const k = static_cast<u32>(l) / side_words % 3, word = side_words * k + static_cast<u32>(l) % side_words;
+      bool const backwards = slab_.inverse[static_cast<int>(k)] < 0;
+      first_word_[l] = word + (backwards ? 3 * side_words : 0), final_word_[l] = word + (backwards ? 0 : 3 * side_words);
+    });
+  }
 
   GART_KERNEL GART_INLINE void trace() {
     while (in_any_group(alive_)) {
@@ -122,17 +129,28 @@ class grouped_ray {
     u32 const last = goes_on ? static_cast<u32>(places_) - 1 : 0, node = m_.node[place];
     u32 const last_key = m_.key[last], last_node = m_.node[last];
     bvh_node const& n = index_.tree.nodes[node];
-    group_values<u32> entry, child;
+    // Each word of the sides is read once for all lanes.
+    group_values<u32> first, final, entry, child;
+    each_in_group([&](int l) {
+      u32 const* const words = &n.plane[0][0][0];
+      first[l] = words[first_word_[l]], final[l] = words[final_word_[l]], child[l] = n.child[l];
+    });
+    auto const& head = load_grid(n);
+    grid_crossing const grid(head, slab_);
     group_values<bool> crossed;
     each_in_group([&](int c) {
-      crossed[c] = false;
-      if (!goes_on) return;
+      u32 side[2][3];
+      GART_UNROLL
+      for (int k = 0; k < 3; ++k) {
+        int const at = side_words * k + c / 4;
+        side[0][k] = of_lane(first, at), side[1][k] = of_lane(final, at);
+      }
       float from;
-      crossed[c] = cross_child(n, c, slab_, near, end_, from);
-      entry[c] = from > 0 ? float_to_bits(from) : 0, child[c] = n.child[c];
+      crossed[c] = cross_child(grid, c, side[0], side[1], near, end_, from) && goes_on;
+      entry[c] = from > 0 ? float_to_bits(from) : 0;
     });
     u32 const all = group_where([&](int c) { return crossed[c]; });
-    u32 const inner = all & n.inner_mask(), leaves = all & n.leaf_mask();
+    u32 const inner = all & head.inner_mask(), leaves = all & head.leaf_mask();
     group_barrier();
     each_in_group([&](int c) {
       if (c == 0 && place < last) m_.key[place] = last_key, m_.node[place] = last_node;
@@ -255,6 +273,7 @@ class grouped_ray {
   u32 last_id_ = 0xffffffffu;
   float end_;  // of the ray
   hits_type hits_;
+  group_values<u32> first_word_, final_word_;  // of a node's sides: those a lane reads where the ray enters and leaves
   int places_ = 0, candidates_ = 0;
   u32 unmet_ = 0, newest_ = 0;  // the nearest entry of a node that candidates are of; that of the last such node
   bool passed_ = false;         // a hit, in this walk
