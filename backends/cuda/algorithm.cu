@@ -57,25 +57,48 @@ void exclusive_scan(cuda_exec& exec, span<u32 const> in, span<T> out, span<std::
 template void exclusive_scan<u32>(cuda_exec&, span<u32 const>, span<u32>, span<u32>);
 template void exclusive_scan<u64>(cuda_exec&, span<u32 const>, span<u64>, span<u64>);
 
-template <sort_key K>
-void sort_pairs(cuda_exec& exec, span<K> keys, span<u32> values, int key_bits) {
+namespace {
+
+// place(whether the sorted keys lie in the other memory, that memory; the same of the values)
+template <class K, class F>
+void sort_into(cuda_exec& exec, span<K> keys, span<u32> values, int key_bits, F const& place) {
   detail::require_sort(keys.size(), values.size(), key_bits, static_cast<int>(8 * sizeof(K)));
   u64 const n = keys.size();
   if (n < 2 || key_bits == 0) return;
   stage_scope scope(exec, "sort_pairs");
   buffer<K, cuda_exec> other_keys(exec, n);
-  buffer<u32, cuda_exec> other_values(exec, n);
+  buffer<u32, cuda_exec> other_values(exec, values.size());
   cub::DoubleBuffer<K> key_pair(keys.data(), other_keys.data());
   cub::DoubleBuffer<u32> value_pair(values.data(), other_values.data());
   run_cub(exec, "sort_pairs", [&](void* memory, std::size_t& bytes) {
     return cub::DeviceRadixSort::SortPairs(memory, bytes, key_pair, value_pair, n, 0, key_bits,
                                            static_cast<cudaStream_t>(exec.stream()));
   });
-  if (key_pair.Current() != keys.data()) exec.copy(keys.data(), key_pair.Current(), n * sizeof(K));
-  if (value_pair.Current() != values.data()) exec.copy(values.data(), value_pair.Current(), n * sizeof(u32));
+  place(key_pair.Current() != keys.data(), other_keys, value_pair.Current() != values.data(), other_values);
+}
+
+}  // namespace
+
+template <sort_key K>
+void sort_pairs(cuda_exec& exec, span<K> keys, span<u32> values, int key_bits) {
+  sort_into(exec, keys, values, key_bits, [&](bool moved, auto& other_keys, bool values_moved, auto& other_values) {
+    if (moved) exec.copy(keys.data(), other_keys.data(), keys.size() * sizeof(K));
+    if (values_moved) exec.copy(values.data(), other_values.data(), keys.size() * sizeof(u32));
+  });
+}
+template <device_execution E, sort_key K>
+void sort_pairs(E& exec, buffer<K, E>& keys, buffer<u32, E>& values, int key_bits) {
+  if (values.size() != keys.size()) return sort_pairs(exec, keys.view(), values.view(), key_bits);
+  sort_into(exec, keys.view(), values.view(), key_bits,
+            [&](bool moved, auto& other_keys, bool values_moved, auto& other_values) {
+              if (moved) std::swap(keys, other_keys);
+              if (values_moved) std::swap(values, other_values);
+            });
 }
 template void sort_pairs<u32>(cuda_exec&, span<u32>, span<u32>, int);
 template void sort_pairs<u64>(cuda_exec&, span<u64>, span<u32>, int);
+template void sort_pairs<cuda_exec, u32>(cuda_exec&, buffer<u32, cuda_exec>&, buffer<u32, cuda_exec>&, int);
+template void sort_pairs<cuda_exec, u64>(cuda_exec&, buffer<u64, cuda_exec>&, buffer<u32, cuda_exec>&, int);
 
 template <reducible T>
 void reduce(cuda_exec& exec, span<std::type_identity_t<T> const> in, span<T> out, reduction op) {

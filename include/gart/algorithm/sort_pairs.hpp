@@ -4,13 +4,14 @@
 /// their order, so every policy gives the same permutation.
 ///
 /// keys: n of u32 or u64, sorted in place. values: n of u32, permuted in place. key_bits: 0 to the bits of a key. Each
-/// 8 bits cost a pass, so pass no more than the keys use.
+/// 8 bits cost a pass, so pass no more than the keys use. Whole buffers may end in other memory, which saves a copy.
 /// Memory: a second copy of keys and values, from the policy's workspace (hosts) or its pool (CUDA). Once the largest
 /// size has been seen, nothing is allocated. n = 0 is legal. Errors: invalid_argument for key_bits or a short span.
 /// Method: least significant digit radix sort, one histogram a block of the array, scattered digit by digit, block by
 /// block. A pass whose digit is the same in all keys is skipped.
 
 #include <gart/algorithm/exclusive_scan.hpp>
+#include <gart/exec/buffer.hpp>
 
 #include <array>
 #include <utility>
@@ -24,6 +25,9 @@ concept sort_key = std::same_as<K, u32> || std::same_as<K, u64>;
 /// Compiled into gart::cuda.
 template <sort_key K>
 void sort_pairs(cuda_exec& exec, span<K> keys, span<u32> values, int key_bits);
+/// Compiled into gart::cuda.
+template <device_execution E, sort_key K>
+void sort_pairs(E& exec, buffer<K, E>& keys, buffer<u32, E>& values, int key_bits);
 
 }  // namespace gart
 
@@ -92,6 +96,11 @@ void sort_pairs(E& exec, span<K> keys, span<u32> values, int key_bits) {
     exec.copy(keys.data(), from, n * sizeof(K));
     exec.copy(values.data(), from_values, n * sizeof(u32));
   }
+}
+/// The same of whole buffers.
+template <host_execution E, sort_key K>
+void sort_pairs(E& exec, buffer<K, E>& keys, buffer<u32, E>& values, int key_bits) {
+  sort_pairs(exec, keys.view(), values.view(), key_bits);
 }
 
 }}  // namespace gart::GART_ISA

@@ -253,7 +253,7 @@ class batch_gather {
     parallel_for(exec, "rays/places", static_cast<index_t>(hits.taken),
                  ray_kernels::order_by_ray{hits.runs.read(hits.offsets.data()), hits.ids.data(), hits.sorted_ids.data(),
                                            hits.places.data()});
-    sort_pairs(exec, hits.sorted_ids.view(), hits.places.view(), static_cast<int>(std::bit_width(gaussians - 1)));
+    sort_pairs(exec, hits.sorted_ids, hits.places, static_cast<int>(std::bit_width(gaussians - 1)));
     hits.sorted = true;
   }
   static constexpr index_t tile_hits = ray_kernels::hit_tile::size;

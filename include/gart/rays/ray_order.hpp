@@ -81,7 +81,7 @@ class ray_order {
     keys_.resize(n), order_.resize(n);
     batch_rays const there(rays);
     parallel_for(exec, "rays/order", n, kernel{there, tree, shift, keys_.data(), order_.data()});
-    sort_pairs(exec, keys_.view(), order_.view(), there.origins ? 5 * kernel::levels_with_origins : 2 * kernel::levels);
+    sort_pairs(exec, keys_, order_, there.origins ? 5 * kernel::levels_with_origins : 2 * kernel::levels);
   }
   /// [rays]; null where it is an order of another number of rays.
   u32 const* of(index_t rays) const { return order_.size() == rays ? order_.data() : nullptr; }
