@@ -41,9 +41,9 @@ struct keep_none {
 
 /// What the gradient needs of a hit. It lies together, since hits are read in another order than they are written.
 struct alignas(32) kept_hit {
-  hit_entry entry;    ///< of its colour
-  float depth;        ///< that the ray would have if the hit were opaque
-  u32 id;             ///< the Gaussian
+  hit_entry entry;     ///< of its colour
+  float depth;         ///< that the ray would have if the hit were opaque
+  u32 id;              ///< the Gaussian
   u32 ray_number = 0;  ///< whose it is
 };
 

@@ -1,12 +1,13 @@
 #pragma once
 /// \file
 /// The backward pass of a batch by primitive. The hits that the forward pass kept (keep_hits) are put in the order of
-/// the rays. Then they are sorted by Gaussian, cut into pieces of one Gaussian each, and summed. A lane takes a piece,
-/// then the pieces of a Gaussian are added up in order. No ray is traced, and nothing is atomic. The order of every sum
-/// follows from the hits alone: the same bits in every run.
+/// the rays. Then they are sorted by Gaussian and summed. A warp takes a tile of 128 hits, whatever Gaussians they are
+/// of. What it sums of a Gaussian that goes past the tile is a part; parts are added up in order. No ray is traced, and
+/// nothing is atomic. The order of every sum follows from the hits alone: the same bits in every run.
 ///
-/// Cost: a sort of 8 bytes a hit by as many bits as Gaussians need. Then one read of 20 bytes a hit and 48 of its ray.
-/// Also 240 bytes a piece of 32 hits at SH degree 3. The host reads how many pieces there are.
+/// Cost: a sort of 8 bytes a hit by as many bits as Gaussians need. Then one read of 32 bytes a hit and 48 of its ray.
+/// A row of gradients is written once, of every Gaussian that is hit, after all were set to zero. Memory: 4 bytes a
+/// hit.
 
 #include <gart/algorithm/sort_pairs.hpp>
 #include <gart/rays/batch_gradient.hpp>
@@ -21,8 +22,7 @@ namespace gart { inline namespace GART_ISA {
 template <execution E>
 struct kept_batch {
   /// None yet.
-  explicit kept_batch(E& exec)
-      : runs(exec), ids(exec), hits(exec), offsets(exec), sorted_ids(exec), places(exec) {}
+  explicit kept_batch(E& exec) : runs(exec), ids(exec), hits(exec), offsets(exec), sorted_ids(exec), places(exec) {}
 
   hit_runs<E> runs;                   ///< whose the places are
   buffer<u32, E> ids;                 ///< as keep_hits has them
@@ -64,7 +64,7 @@ struct order_by_ray {
   }
 };
 
-// A tile of the sorted hits: a warp's. A Gaussian's hits that pass its ends are summed in parts.
+// A tile of the sorted hits.
 struct hit_tile {
   static constexpr index_t size = 128;
   static constexpr u32 none = ~u32{0};
@@ -98,8 +98,8 @@ struct sum_targets {
   GART_HD GART_INLINE static void put(float* to, vec3 const& v) { to[0] = v.x, to[1] = v.y, to[2] = v.z; }
 };
 
-// Lanes take a hit each and put down what it is made of. Then they take a part of the row each and go through the hits.
-// So all of them work, however many hits a Gaussian has.
+// Lanes take a hit each and put down what it adds. Then they take three floats of the row each and go through the hits.
+// So all lanes work, however few hits a Gaussian has, and a row is written at once.
 template <class Response, class Hits>
 struct sum_tile {
   static constexpr int block_size = beam_lanes, min_blocks = 32;
@@ -225,8 +225,8 @@ class batch_gather {
     index_t const n = static_cast<index_t>(hits.count);
     if (gradients.count == 0) return;
     sort(exec, hits, n, gradients.count);
-    sum(exec, sorted_hits<batch_hits>{{hits.hits.data()}, hits.sorted_ids.data(), hits.places.data()}, n, rays,
-        records, active_degree, gradients, moments);
+    sum(exec, sorted_hits<batch_hits>{{hits.hits.data()}, hits.sorted_ids.data(), hits.places.data()}, n, rays, records,
+        active_degree, gradients, moments);
   }
 
   /// The same of n hits that are in order.
@@ -240,8 +240,8 @@ class batch_gather {
     index_t const tiles = n / tile_hits + (n % tile_hits != 0);
     parts_.resize(std::size_t{2} * tiles);
     parallel_for(exec, "rays/gather", tile_range{tiles, static_cast<index_t>(beam_lanes)},
-                 ray_kernels::sum_tile<Response, Hits>{
-                     hits, n, rays.data(), records.data(), sh_coefficients(active_degree), out, parts_.data()});
+                 ray_kernels::sum_tile<Response, Hits>{hits, n, rays.data(), records.data(),
+                                                       sh_coefficients(active_degree), out, parts_.data()});
     parallel_for(exec, "rays/sum", tiles * static_cast<index_t>(ray_kernels::sum_row::lanes),
                  ray_kernels::join_parts{hits.ids, n, parts_.data(), out});
   }

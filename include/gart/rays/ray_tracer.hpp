@@ -285,9 +285,8 @@ class ray_tracer {
     for (;;) {
       kept.ids.resize(room), kept.hits.resize(room);
       launch("rays/forward", context.rays,
-             composite_of<keep_hits<E>>(
-                 context.rays, context.options, out,
-                 {kept.runs.begin(n, room), kept.ids.data(), kept.hits.data()}));
+             composite_of<keep_hits<E>>(context.rays, context.options, out,
+                                        {kept.runs.begin(n, room), kept.ids.data(), kept.hits.data()}));
       exclusive_scan(*exec_, span<u32 const>(kept.runs.counts), kept.offsets.view(),
                      kept.runs.used.view().subspan(1, 1));
       u64 used[2];

@@ -2,15 +2,15 @@
 /// \file
 /// The walk of a tree by single rays that are few. Eight lanes take a ray (trace/lane_group.hpp), and a warp takes four
 /// rays, step by step together. One lane a ray would leave a device waiting for the longest of them. A lane tests a
-/// child, evaluates a candidate, or looks up what a hit shows. Nodes are visited once, nearest first. Hits wait until
-/// they lie before all that is left.
+/// child, evaluates a candidate, or looks up what a hit shows. Nodes are visited once, the nearest first. Four are
+/// opened at a time, so that their memory is waited for together. Hits wait until they lie before all that is left.
 ///
-/// Memory a ray: 80 nodes, 48 hits. The farthest of either are dropped where there is no room. Hits before them are
-/// still passed on, and the ray walks again, strictly after its last. Where that brings no hit, one lane goes on as
+/// Memory a ray: 16 nodes a lane, 48 hits. The farthest of either are dropped where there is no room. Hits before them
+/// are still passed on, and the ray walks again, strictly after its last. Where that brings no hit, one lane goes on as
 /// walk_alone does.
 
 #include <gart/trace/beam_walk.hpp>
-#include <gart/trace/group_hits.hpp>
+#include <gart/trace/group_nodes.hpp>
 
 namespace gart { inline namespace GART_ISA { namespace trace_kernels {
 
@@ -29,13 +29,15 @@ concept takes_together = requires(P const& p, typename P::state& s, group_values
 
 // What the lanes of a ray share. Groups of a warp begin eight banks apart.
 struct group_memory {
-  static constexpr int node_room = 80, hit_room = 48;
-  u32 key[node_room], node[node_room];  // bits of the distance of entry
-  u32 candidate[2 * group_lanes];
+  static constexpr int at_once = 4;  // nodes that are opened together
+  static constexpr int node_room = 16, candidate_room = 64, hit_room = 48;
+  static_assert(candidate_room >= (at_once + 1) * group_lanes);
+  group_nodes_memory<node_room> nodes;
+  u32 candidate[candidate_room];  // a ring
   group_hits_memory<hit_room> hits;
   lane_hits<group_lanes, 1> ready;  // to be passed on, in order
   vec3 shown[group_lanes];          // by those
-  u32 apart[12];
+  u32 apart[28];
 };
 static_assert(sizeof(group_memory) % 128 == 32);
 
@@ -45,6 +47,9 @@ class grouped_ray {
   using ray_type = typename P::ray_type;
   using hits_type = group_hits<group_memory::hit_room>;
   static constexpr u32 gone = hits_type::gone;
+  static constexpr int at_once = group_memory::at_once;
+  using nodes_type = group_nodes<group_memory::node_room, at_once>;
+  static constexpr int pass_from = 16;              // hits, from which it is asked which are certain
   static constexpr int side_words = bvh_width / 4;  // of a side of a node
 
  public:
@@ -60,11 +65,13 @@ class grouped_ray {
         last_t_(start_of_ray(scene, program, i)),
         end_(end_of_ray(program, i)),
         hits_(memory.hits),
+        nodes_(memory.nodes),
         alive_(wanted && index.tree.count > 0) {
     each_in_group([&](int l) {
       u32 const k = static_cast<u32>(l) / side_words % 3, word = side_words * k + static_cast<u32>(l) % side_words;
       bool const backwards = slab_.inverse[static_cast<int>(k)] < 0;
-      first_word_[l] = word + (backwards ? 3 * side_words : 0), final_word_[l] = word + (backwards ? 0 : 3 * side_words);
+      first_word_[l] = word + (backwards ? 3 * side_words : 0),
+      final_word_[l] = word + (backwards ? 0 : 3 * side_words);
     });
   }
 
@@ -81,41 +88,29 @@ class grouped_ray {
  private:
   // Once through the tree, up to where something was lost.
   GART_KERNEL GART_INLINE void walk() {
-    hits_.clear();
-    passed_ = false, places_ = alive_ ? 1 : 0, candidates_ = 0;
-    group_barrier();
-    each_in_group([&](int l) {
-      if (l == 0) m_.key[0] = m_.node[0] = 0;
-    });
-    group_barrier();
+    hits_.clear(), nodes_.start(alive_);
+    passed_ = false, candidates_ = first_candidate_ = turn_ = 0;
     float const near = last_t_;
     bool walks = alive_;
     while (in_any_group(walks)) {
-      while (in_any_group(places_ + bvh_width - 1 > group_memory::node_room))
-        lose_node(places_ + bvh_width - 1 > group_memory::node_room);
-      group_values<u32> least, at;
-      u32 const nearest = nearest_node(least, at);
+      while (nodes_.any_full()) lose_nodes();
+      u32 const nearest = nodes_.nearest();
       bool const done = nearest > reach();  // or there is none
-      if (in_any_group(candidates_ >= group_lanes || (done && candidates_ > 0))) evaluate();
+      while (in_any_group(candidates_ >= group_lanes || (done && candidates_ > 0))) evaluate();
       bool const ends = walks && done && candidates_ == 0;
       u32 const bound = ends ? gone : candidates_ > 0 && unmet_ < nearest ? unmet_ : nearest;
       bool const some = hits_.may_pass(bound);
-      if (in_any_group(some && (ends || hits_.size() >= group_lanes))) pass_on(some, bound);
+      if (in_any_group(some && (ends || hits_.size() >= pass_from))) pass_on(some, bound);
       walks = walks && alive_ && !ends;
-      if (!walks) places_ = candidates_ = 0, hits_.drop();
+      if (!walks) candidates_ = 0, hits_.drop(), nodes_.drop();
       bool const goes_on = walks && !done;
-      if (in_any_group(goes_on)) expand(goes_on, of_lane(at, first_lane_of(least, nearest)), nearest, near);
+      if (in_any_group(goes_on)) expand(goes_on, nearest, near);
     }
   }
 
-  // The nearest entry of a node; gone where there is none.
-  GART_HD GART_INLINE u32 nearest_node(group_values<u32>& least, group_values<u32>& at) const {
-    each_in_group([&](int l) {
-      least[l] = gone, at[l] = 0;
-      for (int k = l; k < places_; k += group_lanes)
-        if (m_.key[k] < least[l]) least[l] = m_.key[k], at[l] = static_cast<u32>(k);
-    });
-    return least_in_group([&](int l) { return least[l]; });
+  GART_HD GART_INLINE void lose_nodes() {
+    u32 const key = nodes_.lose_farthest();
+    if (key != gone) hits_.lose(u64{key} << 32);
   }
 
   // Nothing beyond is wanted.
@@ -124,84 +119,70 @@ class grouped_ray {
     return end < lost ? end : lost < gone ? lost : gone - 1;
   }
 
-  // The node at a place gives way to its children, a lane each. `key`: where it is entered.
-  GART_HD GART_INLINE void expand(bool goes_on, u32 place, u32 key, float near) {
-    u32 const last = goes_on ? static_cast<u32>(places_) - 1 : 0, node = m_.node[place];
-    u32 const last_key = m_.key[last], last_node = m_.node[last];
-    bvh_node const& n = index_.tree.nodes[node];
-    // Each word of the sides is read once for all lanes.
-    group_values<u32> first, final, entry, child;
-    each_in_group([&](int l) {
-      u32 const* const words = &n.plane[0][0][0];
-      first[l] = words[first_word_[l]], final[l] = words[final_word_[l]], child[l] = n.child[l];
-    });
-    auto const& head = load_grid(n);
-    grid_crossing const grid(head, slab_);
-    group_values<bool> crossed;
-    each_in_group([&](int c) {
-      u32 side[2][3];
-      GART_UNROLL
-      for (int k = 0; k < 3; ++k) {
-        int const at = side_words * k + c / 4;
-        side[0][k] = of_lane(first, at), side[1][k] = of_lane(final, at);
-      }
-      float from;
-      crossed[c] = cross_child(grid, c, side[0], side[1], near, end_, from) && goes_on;
-      entry[c] = from > 0 ? float_to_bits(from) : 0;
-    });
-    u32 const all = group_where([&](int c) { return crossed[c]; });
-    u32 const inner = all & head.inner_mask(), leaves = all & head.leaf_mask();
-    group_barrier();
-    each_in_group([&](int c) {
-      if (c == 0 && place < last) m_.key[place] = last_key, m_.node[place] = last_node;
-      if (inner >> c & 1u) {
-        int const to = static_cast<int>(last) + count_bits(bits_before(inner, c));
-        m_.key[to] = entry[c], m_.node[to] = child[c];
-      }
-      if (leaves >> c & 1u) m_.candidate[candidates_ + count_bits(bits_before(leaves, c))] = child[c];
-    });
-    group_barrier();
-    if (leaves) newest_ = key, unmet_ = candidates_ == 0 || key < unmet_ ? key : unmet_;
-    if (goes_on) places_ += count_bits(inner) - 1, candidates_ += count_bits(leaves);
-  }
-
-  // The farthest.
-  GART_HD GART_INLINE void lose_node(bool loses) {
-    group_values<u32> most, at;
-    each_in_group([&](int l) {
-      most[l] = gone, at[l] = 0;
-      for (int k = l; k < places_; k += group_lanes)
-        if (~m_.key[k] <= most[l]) most[l] = ~m_.key[k], at[l] = static_cast<u32>(k);
-    });
-    u32 const least = least_in_group([&](int l) { return most[l]; }), place = of_lane(at, first_lane_of(most, least));
-    if (loses) --places_, hits_.lose(u64{~least} << 32);
-    group_barrier();
-    each_in_group([&](int l) {
-      if (loses && l == 0) m_.key[place] = m_.key[places_], m_.node[place] = m_.node[places_];
-    });
+  // The nearest nodes give way to their children. `key`: where the nearest of all is entered.
+  GART_HD GART_INLINE void expand(bool goes_on, u32 key, float near) {
+    u32 nodes[at_once];
+    bool opens[at_once];
+    nodes_.take(goes_on, key, reach(), nodes, opens);
+    // A lane reads a word of each side for all lanes.
+    group_values<u32> first[at_once], final[at_once], child[at_once];
+    turn_ = (turn_ + 3) % bvh_width;
+    GART_UNROLL
+    for (int i = 0; i < at_once; ++i)
+      each_in_group([&](int l) {
+        bvh_node const& n = index_.tree.nodes[nodes[i]];
+        u32 const* const words = &n.plane[0][0][0];
+        first[i][l] = words[first_word_[l]], final[i][l] = words[final_word_[l]], child[i][l] = n.child[child_of(i, l)];
+      });
+    GART_UNROLL
+    for (int i = 0; i < at_once; ++i) {
+      auto const& head = load_grid(index_.tree.nodes[nodes[i]]);
+      grid_crossing const grid(head, slab_);
+      group_values<bool> is_candidate;
+      each_in_group([&](int l) {
+        int const c = child_of(i, l);
+        u32 side[2][3];
+        GART_UNROLL
+        for (int k = 0; k < 3; ++k) {
+          int const from = side_words * k + c / 4;
+          side[0][k] = of_lane(first[i], from), side[1][k] = of_lane(final[i], from);
+        }
+        float from;
+        bool const crossed = cross_child(grid, c, side[0], side[1], near, end_, from) && opens[i];
+        is_candidate[l] = crossed && (head.leaf_mask() >> c & 1u);
+        if (crossed && (head.inner_mask() >> c & 1u)) nodes_.put(l, from > 0 ? float_to_bits(from) : 0, child[i][l]);
+      });
+      u32 const leaves = group_where([&](int l) { return is_candidate[l]; });
+      each_in_group([&](int l) {
+        if (is_candidate[l])
+          m_.candidate[candidate_place(candidates_ + count_bits(bits_before(leaves, l)))] = child[i][l];
+      });
+      if (leaves) newest_ = key, unmet_ = candidates_ == 0 || key < unmet_ ? key : unmet_;
+      candidates_ += count_bits(leaves);
+    }
     group_barrier();
   }
+  GART_HD GART_INLINE int candidate_place(int k) const { return (first_candidate_ + k) % group_memory::candidate_room; }
+  // The child of node i that a lane tests: not always the same one, so that nodes spread over the lanes.
+  GART_HD GART_INLINE int child_of(int i, int lane) const { return (lane + turn_ + 5 * i) % bvh_width; }
 
   // A lane a candidate, those that were found first.
   GART_HD GART_INLINE void evaluate() {
     group_values<hit> found;
     group_values<bool> is_new;
-    group_values<u32> rest;
     each_in_group([&](int l) {
       is_new[l] = l < candidates_;
-      rest[l] = m_.candidate[group_lanes + l];
       if (!is_new[l]) return;
-      u32 const id = m_.candidate[l];
+      u32 const id = m_.candidate[candidate_place(l)];
       ray_gaussian const g = scene_.gaussians[id];
       ray_peak const r = gart::evaluate(g, own_);
       is_new[l] = is_hit(g, r, scene_.near) && before(last_t_, last_id_, r.t, id) && r.t <= end_;
       if (is_new[l]) found[l] = {r.t, id, hit_alpha<Response>(g, r.d2)};
     });
-    group_barrier();
-    each_in_group([&](int l) { m_.candidate[l] = rest[l]; });
     hits_.add(candidates_ > 0, found, is_new);
-    candidates_ = candidates_ > group_lanes ? candidates_ - group_lanes : 0;
-    // What is left is of the last node.
+    int const met = candidates_ < group_lanes ? candidates_ : group_lanes;
+    candidates_ -= met, first_candidate_ = candidate_place(met);
+    // What is left is of the nodes that were opened last.
     unmet_ = newest_;
   }
 
@@ -273,9 +254,11 @@ class grouped_ray {
   u32 last_id_ = 0xffffffffu;
   float end_;  // of the ray
   hits_type hits_;
-  group_values<u32> first_word_, final_word_;  // of a node's sides: those a lane reads where the ray enters and leaves
-  int places_ = 0, candidates_ = 0;
-  u32 unmet_ = 0, newest_ = 0;  // the nearest entry of a node that candidates are of; that of the last such node
+  nodes_type nodes_;
+  int candidates_ = 0, first_candidate_ = 0;   // in the ring
+  int turn_ = 0;                               // of the lanes among a node's children
+  group_values<u32> first_word_, final_word_;  // of a node's sides: what a lane reads, where the ray enters and leaves
+  u32 unmet_ = 0, newest_ = 0;  // the nearest entry of a node that candidates are of; that of those opened last
   bool passed_ = false;         // a hit, in this walk
   bool alive_;
 };

@@ -59,6 +59,18 @@ GART_HD GART_INLINE bool in_any_group(bool so) {
 #endif
 }
 
+/// Whether it is so for any lane of any of them.
+template <class F>
+GART_HD GART_INLINE bool any_in_any_group(F&& f) {
+#if defined(__CUDA_ARCH__)
+  return __any_sync(whole_warp, f(lane_in_group()));
+#else
+  bool so = false;
+  for (int lane = 0; lane < group_lanes; ++lane) so |= f(lane);
+  return so;
+#endif
+}
+
 /// The lanes for which it is true, a bit each.
 template <class F>
 GART_HD GART_INLINE u32 group_where(F&& f) {
