@@ -52,9 +52,10 @@ void check_sort(E& exec, std::vector<K> const& host, int key_bits) {
   CAPTURE(key_bits);
   std::vector<u32> order(n);
   std::iota(order.begin(), order.end(), 0u);
-  buffer<K, E> keys(exec, host);
-  buffer<u32, E> values(exec, order);
+  buffer<K, E> keys(exec, host), whole_keys(exec, host);
+  buffer<u32, E> values(exec, order), whole_values(exec, order);
   sort_pairs(exec, keys.view(), values.view(), key_bits);
+  sort_pairs(exec, whole_keys, whole_values, key_bits);
 
   K const mask = key_bits == 0 ? K{0} : static_cast<K>(~K{0}) >> (8 * sizeof(K) - key_bits);
   std::stable_sort(order.begin(), order.end(), [&](u32 a, u32 b) { return (host[a] & mask) < (host[b] & mask); });
@@ -62,6 +63,8 @@ void check_sort(E& exec, std::vector<K> const& host, int key_bits) {
   std::vector<K> sorted(n);
   for (std::size_t i = 0; i < n; ++i) sorted[i] = host[order[i]];
   CHECK(keys.to_host() == sorted);
+  CHECK(whole_keys.to_host() == sorted);
+  CHECK(whole_values.to_host() == order);
 }
 
 template <class T, class E>

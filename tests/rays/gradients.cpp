@@ -2,6 +2,8 @@
 // a tracer in double.
 #include <rays/sweep.hpp>
 
+#include <algorithm>
+
 using namespace gart_test;
 using gart::gradient_form;
 using gart::index_t;
@@ -30,9 +32,10 @@ TEST_CASE_TEMPLATE("both forms sum the same, one of them the same bits", E, GART
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;
-  // Gaussians with more hits than a piece has, and some with none.
+  // Gaussians with more hits than two tiles of them, and some with none.
   gart::gaussian_model model = cloud(seed, 2, 700);
   for (std::size_t i = 0; i < 20; ++i) model.mean[3 * i] += 1000;
+  for (std::size_t i = 60; i < 180; ++i) model.log_scale[i] += 2;
   sweep const s(seed + 1, 2000);
   gart::gaussians<E> const scene(exec, model);
   traced_sweep<E> traced(exec, s);
@@ -42,6 +45,10 @@ TEST_CASE_TEMPLATE("both forms sum the same, one of them the same bits", E, GART
   // The first has no room for its hits and is traced twice, the second has.
   auto first = tracer.forward(traced.rays.rays(), sweep_options(), {}, gradient_form::primitive);
   auto second = tracer.forward(traced.rays.rays(), sweep_options(), {}, gradient_form::primitive);
+  std::vector<std::size_t> hits(700);
+  for (gart::u32 const id : tracer.list(traced.rays.rays(), sweep_options()).to_host().ids) ++hits[id];
+  CHECK(*std::max_element(hits.begin(), hits.end()) > 3 * gart::ray_kernels::hit_tile::size);
+  CHECK(std::count(hits.begin(), hits.end(), 0u) >= 20);
   auto const by_scatter = traced.differentiate(tracer, scattered, scene.size(), 2);
   auto const by_primitive = traced.differentiate(tracer, first, scene.size(), 2);
   CHECK(difference(by_primitive.gaussians.mean, by_scatter.gaussians.mean) < 1e-4);
