@@ -59,7 +59,8 @@ class group_nodes {
       u32 const key = i == 0 ? first : least_in_group([&](int l) { return least_[l]; });
       int const lane = first_lane_of(least_, key);
       taken[i] = here && key <= reach;
-      nodes[i] = taken[i] ? of_lane(own, lane) : 0;
+      u32 const node = of_lane(own, lane);  // by all groups, those that take none too
+      nodes[i] = taken[i] ? node : 0;
       each_in_group([&](int l) {
         if (l != lane) return;
         if (taken[i]) take_off(l, at_[l]);

@@ -2,7 +2,7 @@
 /// \file
 /// The walk of a tree by single rays that are few. Eight lanes take a ray (trace/lane_group.hpp), and a warp takes four
 /// rays, step by step together. One lane a ray would leave a device waiting for the longest of them. A lane tests a
-/// child, evaluates a candidate, or looks up what a hit shows. Nodes are visited once, the nearest first. Four are
+/// child, evaluates a candidate, or looks up what a hit shows. Nodes are visited once, the nearest first. Two are
 /// opened at a time, so that their memory is waited for together. Hits wait until they lie before all that is left.
 ///
 /// Memory a ray: 16 nodes a lane, 48 hits. The farthest of either are dropped where there is no room. Hits before them
@@ -29,7 +29,7 @@ concept takes_together = requires(P const& p, typename P::state& s, group_values
 
 // What the lanes of a ray share. Groups of a warp begin eight banks apart.
 struct group_memory {
-  static constexpr int at_once = 4;  // nodes that are opened together
+  static constexpr int at_once = 2;  // nodes that are opened together
   static constexpr int node_room = 16, candidate_room = 64, hit_room = 48;
   static_assert(candidate_room >= (at_once + 1) * group_lanes);
   group_nodes_memory<node_room> nodes;
