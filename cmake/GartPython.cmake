@@ -42,7 +42,7 @@ if(Python_Development.Module_FOUND AND NOT _wants_binding STREQUAL "nanobind" AN
 endif()
 
 if(NOT GART_PYTHON)
-  set(_nanobind "nanobind (${Python_EXECUTABLE} -m pip install nanobind, for Python 3.10 or newer)")
+  set(_nanobind "nanobind 2.5 or newer (${Python_EXECUTABLE} -m pip install nanobind, for Python 3.10 or newer)")
   set(_pybind11 "pybind11 2.6 or newer (pybind11-dev, or -Dpybind11_DIR=...)")
   if(NOT Python_Development.Module_FOUND)
     set(_missing "Python's headers (python3-dev, or -DPython_EXECUTABLE=...)")
