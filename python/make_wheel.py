@@ -1,10 +1,13 @@
-"""Packs a built module into a wheel for this interpreter and machine: make_wheel.py BUILD/python/gart FOLDER.
+"""Packs a built module into a wheel for this machine: make_wheel.py BUILD/python/gart FOLDER.
+
+The wheel is for this interpreter, or by the stable ABI for CPython from 3.12 on.
 
 pip install . makes the same where scikit-build-core is; this needs nothing but Python. The libraries that the module links
 (libpng, Embree and others) stay the machine's: such a wheel is for machines like this one.
 """
 import base64
 import hashlib
+import importlib.machinery
 import pathlib
 import re
 import shutil
@@ -17,13 +20,15 @@ import zipfile
 package, out = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
 root = pathlib.Path(__file__).resolve().parent.parent
 version = re.search(r'version\[\] = "([0-9.]+)"', (root / "include/gart/core/version.hpp").read_text())[1]
-suffix = sysconfig.get_config_var("EXT_SUFFIX")
-if not (package / f"_gart{suffix}").exists():
-    sys.exit(f"{package} has no _gart{suffix}: build the target gart_python, and run this by the Python it was built for")
+suffixes = importlib.machinery.EXTENSION_SUFFIXES  # this interpreter's own, then the stable ABI's
+suffix = next((s for s in suffixes if (package / f"_gart{s}").exists()), None)
+if suffix is None:
+    sys.exit(f"{package} has no _gart{suffixes[0]}: build the target gart_python, and run this by the Python it was built for")
 if b"libgart_runtime.so" in (package / f"_gart{suffix}").read_bytes():
     sys.exit(f"{package} links gart's shared libraries, which a wheel has not: configure with BUILD_SHARED_LIBS=OFF")
 python = f"cp{sys.version_info.major}{sys.version_info.minor}"
-tag = f"{python}-{python}-{re.sub('[^a-z0-9]', '_', sysconfig.get_platform().lower())}"
+python = f"{python}-{python}" if suffix == suffixes[0] else "cp312-abi3"  # nanobind's stable ABI is that of 3.12
+tag = f"{python}-{re.sub('[^a-z0-9]', '_', sysconfig.get_platform().lower())}"
 info = f"gart-{version}.dist-info"
 files = {f"gart/{p.relative_to(package).as_posix()}": p.read_bytes() for p in sorted(package.rglob("*"))
          if p.name in (f"_gart{suffix}", "py.typed") or p.suffix in (".py", ".pyi")}

@@ -30,7 +30,7 @@ class Gart(CMakePackage, CudaPackage):
     depends_on("mpi", when="+mpi")
     depends_on("cuda@12:", when="+cuda")
     extends("python", when="+python")
-    depends_on("py-pybind11", type="build", when="+python")
+    depends_on("py-nanobind@2.5:", type="build", when="+python")
     depends_on("py-numpy", type="run", when="+python")
 
     def cmake_args(self):

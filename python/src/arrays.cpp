@@ -14,7 +14,7 @@ std::string shape_text(std::vector<std::int64_t> const& shape) {
 }
 
 // The element of a buffer's format: a code and bits of DLPack, or none.
-std::pair<int, int> element_of(char const* format, py::ssize_t item_bytes) {
+std::pair<int, int> element_of(char const* format, Py_ssize_t item_bytes) {
   if (!format) return {1, 8};
   if (std::strchr("@=<", *format) && *format) ++format;
   if (!*format || format[1]) return {-1, 0};
@@ -47,19 +47,19 @@ std::unique_ptr<Py_buffer> buffer_of(py::handle argument, bool& writable) {
   if (writable) return out;
   PyErr_Clear();
   if (PyObject_GetBuffer(argument.ptr(), out.get(), flags) == 0) return out;
-  py::error_already_set const refused;
+  py::python_error const refused;
   if (!py::hasattr(argument, "__dlpack__")) throw refused;
   return nullptr;
 }
 
 // The capsule itself, as torch.utils.dlpack.to_dlpack makes it, where the caller keeps the order of work.
 py::object capsule_of(py::handle argument, wanted const& w, place const& where) {
-  if (PyCapsule_IsValid(argument.ptr(), "dltensor")) return py::reinterpret_borrow<py::object>(argument);
+  if (PyCapsule_IsValid(argument.ptr(), "dltensor")) return py::borrow(argument);
   if (!py::hasattr(argument, "__dlpack__"))
     throw gart::invalid_argument(std::string(w.name) +
                                  " must be an array: an object with the buffer protocol or with " + "__dlpack__, not " +
-                                 std::string(py::str(py::type::of(argument))));
-  auto const device = argument.attr("__dlpack_device__")().cast<std::pair<int, int>>();
+                                 py::cast<std::string>(py::repr(argument.attr("__class__"))));
+  auto const device = py::cast<std::pair<int, int>>(argument.attr("__dlpack_device__")());
   if (device.first != dl_cuda || !where.cuda) return argument.attr("__dlpack__")();
   return argument.attr("__dlpack__")(py::arg("stream") = reinterpret_cast<std::intptr_t>(where.stream));
 }
@@ -89,7 +89,7 @@ lent lent::take(py::handle argument, wanted const& w, place const& where) {
   }
   py::object const capsule = capsule_of(argument, w, where);
   auto* managed = static_cast<dl_managed_tensor*>(PyCapsule_GetPointer(capsule.ptr(), "dltensor"));
-  if (!managed) throw py::error_already_set();
+  if (!managed) throw py::python_error();
   PyCapsule_SetName(capsule.ptr(), "used_dltensor");
   out.kept_ = std::shared_ptr<void>(managed, [](void* p) {
     auto* m = static_cast<dl_managed_tensor*>(p);

@@ -4,12 +4,10 @@
 // numpy array that owns it.
 
 #include "dlpack.hpp"
+#include "py.hpp"
 
 #include <gart/core/error.hpp>
 #include <gart/scene/image.hpp>
-
-#include <pybind11/numpy.h>
-#include <pybind11/pybind11.h>
 
 #include <array>
 #include <memory>
@@ -19,8 +17,6 @@
 #include <vector>
 
 namespace gart_python {
-
-namespace py = pybind11;
 
 // Where memory lies.
 struct place {
@@ -53,10 +49,21 @@ class lent {
   static lent if_given(py::handle argument, wanted const& w, place const& where = {}) {
     return argument.is_none() ? lent() : of<T>(argument, w, where);
   }
+  // Of either type on the host; a refusal asks for the second.
+  template <class T, class Else>
+  static lent of_either(py::handle argument, wanted const& w) {
+    lent out = take(argument, w, {});
+    out.require(w, {}, out.holds<T>() ? kind_of<T>() : kind_of<Else>());
+    return out;
+  }
 
   template <class T>
   T* data() const {
     return static_cast<T*>(data_);
+  }
+  template <class T>
+  bool holds() const {
+    return type_ == kind_of<T>();
   }
   std::vector<std::int64_t> const& shape() const { return shape_; }
   std::size_t size() const;
@@ -85,26 +92,27 @@ class lent {
 
 // A numpy array of this shape that owns what it is given.
 template <class Values>
-py::object owned_array(std::vector<py::ssize_t> shape, Values values) {
+py::object owned_array(std::vector<std::int64_t> const& shape, Values values) {
   using T = std::remove_cvref_t<decltype(*values.data())>;
   auto kept = std::make_unique<Values>(std::move(values));
   T* const data = kept->data();
-  py::capsule owner(kept.get(), [](void* p) { delete static_cast<Values*>(p); });
+  py::capsule const owner(kept.get(), [](void* p) noexcept { delete static_cast<Values*>(p); });
   kept.release();
-  return py::array_t<T>(std::move(shape), data, owner);
+  return py::numpy_array<T>(shape, data, owner);
 }
 // One that shows memory which `owner` keeps.
 template <class T>
-py::object shown_array(std::vector<py::ssize_t> shape, T* data, py::handle owner) {
-  return py::array_t<std::remove_const_t<T>>(std::move(shape), data, owner);
+py::object shown_array(std::vector<std::int64_t> const& shape, T* data, py::handle owner) {
+  using written = std::remove_const_t<T>;
+  return py::numpy_array<written>(shape, const_cast<written*>(data), owner);
 }
 
 // [height, width], and channels where there is not just one.
 template <class T>
 py::object image_array(gart::basic_image<T> image) {
-  std::vector<py::ssize_t> shape{image.height, image.width};
+  std::vector<std::int64_t> shape{image.height, image.width};
   if (image.channels != 1) shape.push_back(image.channels);
-  return owned_array(std::move(shape), std::move(image.data));
+  return owned_array(shape, std::move(image.data));
 }
 
 }  // namespace gart_python

@@ -8,10 +8,6 @@
 #include <gart/runtime/model_file.hpp>
 #include <gart/runtime/renderer.hpp>
 
-#include <pybind11/pybind11.h>
-#include <pybind11/stl.h>
-#include <pybind11/stl/filesystem.h>
-
 #include <memory>
 #include <mutex>
 #include <string>
@@ -22,8 +18,6 @@ void bind_errors(py::module_& m);
 void bind_scene(py::module_& m);
 void bind_dataset(py::module_& m);
 void bind_options(py::module_& m);
-void bind_renderer(py::module_& m);
-void bind_contexts(py::module_& m);
 void bind_session(py::module_& m);
 void bind_reference(py::module_& m);
 
@@ -55,8 +49,23 @@ decltype(auto) without_gil(std::mutex& mutex, F&& f) {
   return f();
 }
 
+// The name of an argument that is an array. None comes too, and is refused by name.
+inline auto array_arg(char const* name) { return py::arg(name).none(); }
+
+// What a value holds. Errors: TypeError, by what is wanted of it.
+template <class T>
+T taken(py::handle value, std::string const& name) {
+  try {
+    return py::cast<T>(value);
+  } catch (py::cast_error const&) {
+    throw py::type_error(name + " cannot be " + py::cast<std::string>(py::repr(value)));
+  }
+}
+
 // A renderer and what it was lent.
 struct python_renderer {
+  python_renderer(py::object const& model, py::kwargs const& given);
+
   std::unique_ptr<gart::renderer> it;
   gart::configuration_request request;
   place where;
@@ -67,6 +76,10 @@ struct python_renderer {
   lent bound_features;         // the same
   std::mutex mutex;
 };
+
+using renderer_class = py::class_<python_renderer, std::shared_ptr<python_renderer>>;
+renderer_class bind_renderer(py::module_& m);
+void bind_contexts(py::module_& m, renderer_class& renderer);
 
 constexpr char const* parameter_names[] = {"mean", "log_scale", "quaternion", "opacity", "sh"};
 

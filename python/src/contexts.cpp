@@ -150,7 +150,7 @@ py::dict trace(python_renderer& r, py::object const& directions, py::object cons
   std::vector<lent> kept;
   gart::ray_batch const rays = rays_of("Renderer.trace", directions, origins, t_max, frame, {}, kept);
   gart::traced_rays seen = without_gil(r.mutex, [&] { return r.it->trace(rays, o, features); });
-  py::ssize_t const n = rays.count();
+  std::int64_t const n = rays.count();
   py::dict out;
   if (features && r.features > 0) out["features"] = owned_array({n, r.features}, std::move(seen.features));
   out["color"] = owned_array({n, 3}, std::move(seen.color));
@@ -169,9 +169,9 @@ py::dict list_hits(python_renderer& r, py::object const& directions, py::object 
   std::vector<lent> kept;
   gart::ray_batch const rays = rays_of("Renderer.list_hits", directions, origins, t_max, frame, {}, kept);
   gart::hit_lists hits = without_gil(r.mutex, [&] { return r.it->list_hits(rays, o); });
-  auto const n = static_cast<py::ssize_t>(hits.ids.size());
+  auto const n = static_cast<std::int64_t>(hits.ids.size());
   py::dict out;
-  out["offsets"] = owned_array({static_cast<py::ssize_t>(rays.count()) + 1}, std::move(hits.offsets));
+  out["offsets"] = owned_array({static_cast<std::int64_t>(rays.count()) + 1}, std::move(hits.offsets));
   out["ids"] = owned_array({n}, std::move(hits.ids)), out["t"] = owned_array({n}, std::move(hits.t));
   out["alpha"] = owned_array({n}, std::move(hits.alpha)), out["weight"] = owned_array({n}, std::move(hits.weight));
   return out;
@@ -179,10 +179,10 @@ py::dict list_hits(python_renderer& r, py::object const& directions, py::object 
 
 }  // namespace
 
-void bind_contexts(py::module_& m) {
+void bind_contexts(py::module_& m, renderer_class& renderer) {
   auto const none = py::none();
   std::array<double, 3> const origin{0, 0, 0};
-  py::class_<context>(m, "Context", py::module_local(),
+  py::class_<context>(m, "Context",
                       R"(What a forward pass leaves for its backward pass, of Renderer.forward or forward_rays.
 
 Others may run in between. Bound Gaussians, features and rays must stay as they are until the last backward; where the
@@ -213,8 +213,6 @@ origins, directions                      [R, 3], dL/d rays
 features                                 [N, F], dL/d features, overwritten)")
       .def("_backward_at", &backward_at);
 
-  // Renderer is bound before this.
-  auto renderer = py::reinterpret_borrow<py::class_<python_renderer, shared_renderer>>(m.attr("Renderer"));
   renderer.def("_forward_at", &forward_at)
       .def(
           "forward",
@@ -224,15 +222,17 @@ features                                 [N, F], dL/d features, overwritten)")
           },
           py::arg("camera"), py::arg("options") = none, py::kw_only(), py::arg("color") = none,
           py::arg("transmittance") = none, py::arg("depth") = none, py::arg("hits") = none, py::arg("rgba") = none,
-          py::arg("features") = none, "As render_to, with what gradients need: returns a Context.")
-      .def("forward_rays", &forward_rays, py::arg("directions"), py::arg("origins") = none, py::arg("t_max") = none,
+          py::arg("features") = none, py::others("settings"),
+          "As render_to, with what gradients need: returns a Context.")
+      .def("forward_rays", &forward_rays, array_arg("directions"), py::arg("origins") = none, py::arg("t_max") = none,
            py::arg("frame") = origin, py::kw_only(), py::arg("color") = none, py::arg("transmittance") = none,
-           py::arg("depth") = none, py::arg("features") = none, py::arg("options") = none,
+           py::arg("depth") = none, py::arg("features") = none, py::arg("options") = none, py::others("settings"),
            R"(What rays see, from and to memory of the policy, with what gradients need: returns a Context.
 
 Rays as of trace; color [R, 3], transmittance and depth [R], features [R, F], float32.)")
-      .def("trace", &trace, py::arg("directions"), py::arg("origins") = none, py::arg("t_max") = none,
+      .def("trace", &trace, array_arg("directions"), py::arg("origins") = none, py::arg("t_max") = none,
            py::arg("frame") = origin, py::arg("options") = none, py::kw_only(), py::arg("features") = false,
+           py::others("settings"),
            R"(What rays see that no image has, from arrays of the host, as a dictionary of new numpy arrays.
 
 directions  float32 [R, 3], of any length but 0
@@ -242,8 +242,8 @@ t_max       float32 [R], where rays end, world units along the ray; None: nowher
 color [R, 3], transmittance, depth (sum of weight * t), median (t of the hit that brings the transmittance below 0.5) and
 first (t of the first hit; -1 where there is none) [R]; hits, first_id, median_id, top_id (of the largest weight) uint32 [R]. With
 features=True, where there are any, features [R, F].)")
-      .def("list_hits", &list_hits, py::arg("directions"), py::arg("origins") = none, py::arg("t_max") = none,
-           py::arg("frame") = origin, py::arg("options") = none,
+      .def("list_hits", &list_hits, array_arg("directions"), py::arg("origins") = none, py::arg("t_max") = none,
+           py::arg("frame") = origin, py::arg("options") = none, py::others("settings"),
            R"(All hits of rays in order, as trace takes them: a dictionary of new numpy arrays.
 
 offsets  uint64 [R + 1]: hits of ray r are [offsets[r], offsets[r + 1]) of the others

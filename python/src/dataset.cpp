@@ -22,9 +22,9 @@ gart::image8 image_of(py::handle argument, char const* name) {
 template <class T>
 py::object shown_image(gart::basic_image<T> const& image, py::handle owner) {
   if (image.empty()) return py::none();
-  std::vector<py::ssize_t> shape{image.height, image.width};
+  std::vector<std::int64_t> shape{image.height, image.width};
   if (image.channels != 1) shape.push_back(image.channels);
-  return shown_array(std::move(shape), image.data.data(), owner);
+  return shown_array(shape, image.data.data(), owner);
 }
 
 // As of a capture that is read.
@@ -95,30 +95,30 @@ Raises IoError, Unsupported for a camera model that gart does not trace, Invalid
 
 void bind_dataset(py::module_& m) {
   using view = gart::dataset_view;
-  py::class_<view, std::shared_ptr<view>>(m, "View", py::module_local(),
+  py::class_<view, std::shared_ptr<view>>(m, "View",
                                           R"(A photograph and its camera: View(name, camera, image).
 
 image  uint8 [H, W, 3], or [H, W, 4] with straight alpha)")
-      .def(py::init([](std::string name, gart::camera const& camera, py::object const& image) {
-             auto out = std::make_shared<view>();
-             out->name = std::move(name), out->view = camera, out->image = image_of(image, "View: image");
-             if (out->image.width != camera.width || out->image.height != camera.height ||
-                 (out->image.channels != 3 && out->image.channels != 4))
+      .def(py::made_by([](std::string name, gart::camera const& camera, py::object const& image) {
+             view out;
+             out.name = std::move(name), out.view = camera, out.image = image_of(image, "View: image");
+             if (out.image.width != camera.width || out.image.height != camera.height ||
+                 (out.image.channels != 3 && out.image.channels != 4))
                throw gart::invalid_argument("View: image must be of the camera's size, [H, W, 3] or [H, W, 4]");
              return out;
            }),
-           py::arg("name"), py::arg("camera"), py::arg("image"))
-      .def_readonly("name", &view::name)
-      .def_property_readonly(
+           py::arg("name"), py::arg("camera"), array_arg("image"))
+      .def_ro("name", &view::name)
+      .def_prop_ro(
           "camera", [](view const& v) { return v.view; }, "a copy")
-      .def_property_readonly(
-          "image", [](py::object const& s) { return shown_image(s.cast<view const&>().image, s); },
+      .def_prop_ro(
+          "image", [](py::object const& s) { return shown_image(py::cast<view const&>(s).image, s); },
           "uint8 [H, W, 3 or 4], the dataset's own memory; None where images were not loaded")
-      .def_property_readonly(
-          "mask", [](py::object const& s) { return shown_image(s.cast<view const&>().mask, s); },
+      .def_prop_ro(
+          "mask", [](py::object const& s) { return shown_image(py::cast<view const&>(s).mask, s); },
           "uint8 [H, W], 0 where pixels are ignored; None where there is no mask")
-      .def_property_readonly(
-          "depth", [](py::object const& s) { return shown_image(s.cast<view const&>().depth, s); },
+      .def_prop_ro(
+          "depth", [](py::object const& s) { return shown_image(py::cast<view const&>(s).depth, s); },
           "float32 [H, W], distance along the ray, 0 where not measured; None where not loaded")
       .def("__repr__", [](view const& v) { return "gart.View('" + v.name + "')"; });
 
@@ -131,43 +131,39 @@ image  uint8 [H, W, 3], or [H, W, 4] with straight alpha)")
     };
   };
   py::class_<gart::dataset, shared_dataset>(
-      m, "Dataset", py::module_local(),
+      m, "Dataset",
       R"(A capture in host memory: Dataset(train, test=[], points=None, colors=None), or load_dataset.
 
 train, test  lists of View
 points       float32 [N, 3], where training starts; none: at random
 colors       uint8 [N, 3])")
-      .def(py::init(
-               [](std::vector<view> train, std::vector<view> test, py::object const& points, py::object const& colors) {
-                 return std::make_shared<gart::dataset>(dataset_of(std::move(train), std::move(test), points, colors));
-               }),
-           py::arg("train"), py::arg("test") = std::vector<view>{}, py::arg("points") = py::none(),
-           py::arg("colors") = py::none())
-      .def_property_readonly("train", views(&gart::dataset::train))
-      .def_property_readonly("test", views(&gart::dataset::test))
-      .def_readonly("format", &gart::dataset::format, "COLMAP, Blender, nerfstudio, or arrays")
-      .def_readonly("split", &gart::dataset::split, "how train and test were told apart")
-      .def_readonly("notes", &gart::dataset::notes, "what was skipped, scaled or assumed, a line each")
-      .def_readonly("extent", &gart::dataset::extent, "1.1 times the largest distance of a camera from their mean")
-      .def_property_readonly(
+      .def(py::made_by(&dataset_of), py::arg("train"), py::arg("test") = std::vector<view>{},
+           py::arg("points") = py::none(), py::arg("colors") = py::none())
+      .def_prop_ro("train", views(&gart::dataset::train))
+      .def_prop_ro("test", views(&gart::dataset::test))
+      .def_ro("format", &gart::dataset::format, "COLMAP, Blender, nerfstudio, or arrays")
+      .def_ro("split", &gart::dataset::split, "how train and test were told apart")
+      .def_ro("notes", &gart::dataset::notes, "what was skipped, scaled or assumed, a line each")
+      .def_ro("extent", &gart::dataset::extent, "1.1 times the largest distance of a camera from their mean")
+      .def_prop_ro(
           "origin",
           [](gart::dataset const& d) {
             return std::array{d.origin.x, d.origin.y, d.origin.z};
           },
           "what coordinates are relative to")
-      .def_readonly("alpha", &gart::dataset::alpha, "whether images carry alpha")
-      .def_property_readonly(
+      .def_ro("alpha", &gart::dataset::alpha, "whether images carry alpha")
+      .def_prop_ro(
           "points",
           [](py::object const& s) {
-            auto const& p = s.cast<gart::dataset const&>().points;
-            return shown_array({static_cast<py::ssize_t>(p.size()), 3}, p.position.data(), s);
+            auto const& p = py::cast<gart::dataset const&>(s).points;
+            return shown_array({static_cast<std::int64_t>(p.size()), 3}, p.position.data(), s);
           },
           "float32 [N, 3]")
-      .def_property_readonly(
+      .def_prop_ro(
           "colors",
           [](py::object const& s) {
-            auto const& p = s.cast<gart::dataset const&>().points;
-            return shown_array({static_cast<py::ssize_t>(p.size()), 3}, p.color.data(), s);
+            auto const& p = py::cast<gart::dataset const&>(s).points;
+            return shown_array({static_cast<std::int64_t>(p.size()), 3}, p.color.data(), s);
           },
           "uint8 [N, 3]")
       .def("__repr__", [](gart::dataset const& d) {

@@ -12,18 +12,18 @@ PyObject* errors = nullptr;
 
 template <class... Attributes>
 void raise(char const* type, std::string const& message, Attributes const&... attributes) {
-  py::object const error = py::handle(errors).attr(type)(message);
+  py::object const kind = py::handle(errors).attr(type), error = kind(message);
   (py::setattr(error, attributes.first, py::cast(attributes.second)), ...);
-  PyErr_SetObject(py::type::of(error).ptr(), error.ptr());
+  PyErr_SetObject(kind.ptr(), error.ptr());
 }
 
 }  // namespace
 
 void bind_errors(py::module_& m) {
   // Of the package that this module lies in, whose name need not be gart.
-  auto const name = m.attr("__name__").cast<std::string>();
-  errors = py::module_::import((name.substr(0, name.rfind('.')) + ".errors").c_str()).release().ptr();
-  py::register_local_exception_translator([](std::exception_ptr thrown) {
+  auto const name = py::cast<std::string>(m.attr("__name__"));
+  errors = py::imported((name.substr(0, name.rfind('.')) + ".errors").c_str()).release().ptr();
+  py::translate_errors([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(thrown);
     } catch (gart::io_error const& e) {

@@ -12,15 +12,16 @@ namespace {
 
 // Whether the class of an object has a field of that name.
 bool has_field(py::handle object, std::string const& name) {
-  py::handle const type = py::type::handle_of(object);
+  py::object const type = object.attr("__class__");
   if (!py::hasattr(type, name.c_str())) return false;
-  return py::isinstance(type.attr(name.c_str()), py::module_::import("builtins").attr("property"));
+  return py::isinstance(type.attr(name.c_str()), py::imported("builtins").attr("property"));
 }
 
 std::string fields_of_class(py::handle object) {
   std::string out;
-  for (auto const& name : py::module_::import("builtins").attr("dir")(py::type::of(object))) {
-    auto const text = name.cast<std::string>();
+  py::object const names = py::imported("builtins").attr("dir")(object.attr("__class__"));
+  for (py::handle const name : names) {
+    auto const text = py::cast<std::string>(name);
     if (has_field(object, text)) out += (out.empty() ? "" : ", ") + text;
   }
   return out;
@@ -29,7 +30,7 @@ std::string fields_of_class(py::handle object) {
 // An enumeration by its names.
 template <class C, class Owner, class E>
 void named_field(C& c, char const* name, E Owner::*member, char const* text) {
-  c.def_property(
+  c.def_prop_rw(
       name, [member](Owner const& o) { return to_string(o.*member); },
       [member](Owner& o, std::string const& value) { o.*member = gart::from_string<E>(value); }, text);
 }
@@ -39,7 +40,7 @@ struct option_group {
   py::object owner;    // keeps the options
   std::string prefix;  // "rates."
 
-  gart::train_options& options() const { return owner.cast<gart::train_options&>(); }
+  gart::train_options& options() const { return py::cast<gart::train_options&>(owner); }
 };
 
 bool begins(std::string_view name, std::string_view prefix) { return name.substr(0, prefix.size()) == prefix; }
@@ -64,7 +65,7 @@ py::object get_field(option_group const& group, std::string const& name) {
 bool set_field(option_group const& group, std::string const& name, py::handle value) {
   gart::option_field const* const f = gart::find_option_field(group.prefix + name);
   if (!f) return false;
-  auto const number = value.cast<double>();
+  auto const number = taken<double>(value, "train_options." + std::string(f->name));
   if (!(number >= f->low && number <= f->high))
     throw gart::invalid_argument("train_options." + std::string(f->name) + " is " + gart::short_number(number) +
                                  ": from " + gart::short_number(f->low) + " to " + gart::short_number(f->high));
@@ -76,30 +77,30 @@ bool set_field(option_group const& group, std::string const& name, py::handle va
 
 void set_attributes(py::handle object, py::kwargs const& given) {
   for (auto const& [key, value] : given) {
-    py::object owner = py::reinterpret_borrow<py::object>(object);
-    auto name = key.cast<std::string>();
+    py::object owner = py::borrow(object);
+    auto name = py::cast<std::string>(key);
     for (std::size_t dot; (dot = name.find('.')) != std::string::npos; name = name.substr(dot + 1)) {
       if (!has_field(owner, name.substr(0, dot))) break;
       owner = owner.attr(name.substr(0, dot).c_str());
     }
     if (!has_field(owner, name))
-      throw py::type_error("no option '" + key.cast<std::string>() + "': there are " + fields_of_class(owner));
+      throw py::type_error("no option '" + py::cast<std::string>(key) + "': there are " + fields_of_class(owner));
     py::setattr(owner, name.c_str(), value);
   }
 }
 
 gart::render_options options_of(py::handle options, py::kwargs const& given, gart::render_options const& otherwise) {
-  gart::render_options const base = options.is_none() ? otherwise : options.cast<gart::render_options>();
-  if (given.empty()) return base;
+  gart::render_options const base = options.is_none() ? otherwise : taken<gart::render_options>(options, "options");
+  if (given.size() == 0) return base;
   py::object const made = py::cast(base);
   set_attributes(made, given);
-  return made.cast<gart::render_options>();
+  return py::cast<gart::render_options>(made);
 }
 
 void bind_options(py::module_& m) {
   using render = gart::render_options;
   using triple = std::array<float, 3>;
-  py::class_<render>(m, "RenderOptions", py::module_local(),
+  py::class_<render>(m, "RenderOptions",
                      R"(How one view is rendered: RenderOptions(near=0.1) sets what is named.
 
 alpha_min          a Gaussian is hit where its alpha is at least this (1/255)
@@ -109,14 +110,14 @@ max_hits           a ray ends after so many hits; 0: no cap
 antialias          standard deviation of the pixels' filter, in pixels; 0: none
 rebuild_every      views between two builds of the bvh tracer's tree
 background         three numbers behind the last hit)")
-      .def(py::init([](py::kwargs const& given) { return options_of(py::none(), given, {}); }))
-      .def_readwrite("alpha_min", &render::alpha_min)
-      .def_readwrite("transmittance_min", &render::transmittance_min)
-      .def_readwrite("near", &render::near)
-      .def_readwrite("max_hits", &render::max_hits)
-      .def_readwrite("antialias", &render::antialias)
-      .def_readwrite("rebuild_every", &render::rebuild_every)
-      .def_property(
+      .def(py::made_by([](py::kwargs const& given) { return options_of(py::none(), given, {}); }))
+      .def_rw("alpha_min", &render::alpha_min)
+      .def_rw("transmittance_min", &render::transmittance_min)
+      .def_rw("near", &render::near)
+      .def_rw("max_hits", &render::max_hits)
+      .def_rw("antialias", &render::antialias)
+      .def_rw("rebuild_every", &render::rebuild_every)
+      .def_prop_rw(
           "background",
           [](render const& o) {
             return triple{o.background.x, o.background.y, o.background.z};
@@ -124,8 +125,7 @@ background         three numbers behind the last hit)")
           [](render& o, triple const& b) { o.background = gart::vec3(b[0], b[1], b[2]); });
 
   using train = gart::train_options;
-  py::class_<option_group>(m, "OptionGroup", py::module_local(),
-                           "Some options of TrainOptions: options.rates has options.rates.mean.")
+  py::class_<option_group>(m, "OptionGroup", "Some options of TrainOptions: options.rates has options.rates.mean.")
       .def("__getattr__", &get_field)
       .def("__setattr__",
            [](option_group const& g, std::string const& name, py::handle value) {
@@ -138,21 +138,21 @@ background         three numbers behind the last hit)")
           if (begins(f.name, g.prefix)) out.append(std::string(f.name.substr(g.prefix.size())));
         return out;
       });
-  py::class_<train> c(m, "TrainOptions", py::module_local(),
+  py::class_<train> c(m, "TrainOptions",
                       R"(The options of a run, by the names of `gart train --set`; fields() has each.
 
 TrainOptions(iterations=2000, densify="mcmc", **{"rates.opacity": 0.05}) sets those that are named; so does
 options.rates.opacity = 0.05.)");
-  c.def(py::init([](py::kwargs const& given) {
+  c.def(py::made_by([](py::kwargs const& given) {
      py::object const made = py::cast(train{});
      for (auto const& [key, value] : given) {
-       auto const name = key.cast<std::string>();
+       auto const name = py::cast<std::string>(key);
        if (set_field({made, ""}, name, value)) continue;
        if (!has_field(made, name))
          throw py::type_error("no option '" + name + "': there are " + fields_of_class(made) + ", " + field_names(""));
        py::setattr(made, name.c_str(), value);
      }
-     return made.cast<train>();
+     return py::cast<train>(made);
    }))
       .def("__getattr__",
            [](py::object const& self, std::string const& name) {
@@ -161,23 +161,22 @@ options.rates.opacity = 0.05.)");
       .def("__setattr__",
            [](py::object const& self, std::string const& name, py::object const& value) {
              if (set_field({self, ""}, name, value)) return;
-             if (PyObject_GenericSetAttr(self.ptr(), py::str(name).ptr(), value.ptr()) != 0)
-               throw py::error_already_set();
+             if (PyObject_GenericSetAttr(self.ptr(), py::cast(name).ptr(), value.ptr()) != 0) throw py::python_error();
            })
       .def_static(
           "fields",
           [] {
             py::dict out;
             for (gart::option_field const& f : gart::option_fields)
-              out[py::str(std::string(f.name))] = py::make_tuple(f.low, f.high, std::string(f.help));
+              out[py::cast(f.name)] = py::make_tuple(f.low, f.high, std::string(f.help));
             return out;
           },
           "Name: (least, most, what it is), of all numbers and switches.")
-      .def_readwrite("held_out", &train::held_out, "training views, by index, that are not trained on");
+      .def_rw("held_out", &train::held_out, "training views, by index, that are not trained on");
   named_field(c, "densify", &train::densify, "error, mcmc, adc or none: how the number of Gaussians grows");
   named_field(c, "background", &train::background, "white, black or random: what is behind the scene");
-  c.def_readwrite("exposure", &train::exposure, "learn an exposure of each training view");
-  c.def_readwrite("vignetting", &train::vignetting, "learn the falloff of each lens");
+  c.def_rw("exposure", &train::exposure, "learn an exposure of each training view");
+  c.def_rw("vignetting", &train::vignetting, "learn the falloff of each lens");
 }
 
 }  // namespace gart_python

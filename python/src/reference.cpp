@@ -16,7 +16,7 @@ std::vector<double> values_of(py::handle argument, wanted const& w) {
 py::dict reference(gart::model_file const& file, gart::camera const& view, py::object const& color,
                    py::object const& depth, py::object const& options, py::kwargs const& given) {
   gart::render_options const o = options_of(options, given, file.render);
-  py::ssize_t const h = view.height, w = view.width;
+  std::int64_t const h = view.height, w = view.width;
   auto const by_color = values_of(color, {"reference: color_gradient", {h, w, 3}});
   auto const by_depth = values_of(depth, {"reference: depth_gradient", {h, w}});
   gart::reference_image got;
@@ -31,7 +31,7 @@ py::dict reference(gart::model_file const& file, gart::camera const& view, py::o
   out["depth"] = owned_array({h, w}, std::move(got.depth));
   out["hits"] = owned_array({h, w}, std::move(got.hits));
   if (!color.is_none()) {
-    auto const n = static_cast<py::ssize_t>(file.model.size());
+    auto const n = static_cast<std::int64_t>(file.model.size());
     gart::reference_gradients& g = got.gradients;
     py::dict gradients;
     gradients["mean"] = owned_array({n, 3}, std::move(g.mean));
@@ -48,7 +48,7 @@ py::dict reference(gart::model_file const& file, gart::camera const& view, py::o
 
 void bind_reference(py::module_& m) {
   m.def("reference", &reference, py::arg("model"), py::arg("camera"), py::arg("color_gradient") = py::none(),
-        py::arg("depth_gradient") = py::none(), py::arg("options") = py::none(),
+        py::arg("depth_gradient") = py::none(), py::arg("options") = py::none(), py::others("settings"),
         R"(An image by its definition, in double, for tests: slow, and it shares no code with the renderer.
 
 As Renderer.render, in float64; with color_gradient, float64 [H, W, 3], also "gradients" by the model's arrays.)");

@@ -12,26 +12,8 @@ namespace {
 using self = python_renderer;
 
 template <class E>
-E named(py::handle value) {
-  return gart::from_string<E>(value.cast<std::string>());
-}
-
-std::shared_ptr<self> make(py::object const& model, py::kwargs const& given) {
-  auto out = std::make_shared<self>();
-  out->request = request_of(given, "Renderer");
-  gart::model_file const* const file = model.is_none() ? nullptr : &model.cast<gart::model_file const&>();
-  if (file && !given.contains("sh_degree")) out->request.sh_degree = file->model.sh_degree;
-  if (file && !given.contains("kernel_degree")) out->request.kernel_degree = file->kernel_degree;
-  bool const on_device = gart::resolve(out->request).backend == gart::backend_kind::cuda;
-  // Without a stream of its own the caller has the legacy default one, which others' work is in order with.
-  if (on_device && !out->request.stream) out->request.stream = reinterpret_cast<void*>(std::uintptr_t{1});
-  out->where = {on_device, out->request.device, out->request.stream};
-  py::gil_scoped_release released;
-  out->it = gart::make_renderer(out->request);
-  if (!file) return out;
-  out->it->set_model(file->model), out->usual = file->render;
-  out->count = std::int64_t(file->model.size()), out->features = file->model.feature_count;
-  return out;
+E named(py::handle value, std::string const& argument) {
+  return gart::from_string<E>(taken<std::string>(value, argument));
 }
 
 void set_model(self& r, gart::model_file const& file) {
@@ -71,7 +53,7 @@ py::dict render(self& r, gart::camera const& view, py::object const& options, bo
   gart::render_options const o = options_of(options, given, r.usual);
   gart::rendered image = without_gil(r.mutex, [&] { return r.it->render(view, o, features); });
   py::dict out;
-  py::ssize_t const width = image.features.channels;
+  std::int64_t const width = image.features.channels;
   if (!image.features.data.empty())
     out["features"] = owned_array({view.height, view.width, width}, std::move(image.features.data));
   out["color"] = image_array(std::move(image.color));
@@ -115,7 +97,7 @@ py::dict backward(self& r, gart::camera const& view, py::object const& color, py
     return r.it->gradients();
   });
   py::dict out;
-  auto const n = static_cast<py::ssize_t>(got.size());
+  auto const n = static_cast<std::int64_t>(got.size());
   out["mean"] = owned_array({n, 3}, std::move(got.mean));
   out["log_scale"] = owned_array({n, 3}, std::move(got.log_scale));
   out["quaternion"] = owned_array({n, 4}, std::move(got.quaternion));
@@ -128,13 +110,12 @@ py::dict backward(self& r, gart::camera const& view, py::object const& color, py
 gart::image_float photo_of(py::handle photo, gart::camera const& view) {
   std::int64_t const h = view.height, w = view.width;
   gart::image_float out(view.width, view.height, 3);
-  if (PyObject_CheckBuffer(photo.ptr()) && py::isinstance<py::array_t<gart::u8>>(photo)) {
-    lent const bytes = lent::of<gart::u8>(photo, {"track: photo", {h, w, 3}});
-    for (std::size_t k = 0; k < bytes.size(); ++k) out.data[k] = static_cast<float>(bytes.data<gart::u8>()[k]) / 255.0f;
-  } else {
-    lent const values = lent::of<float>(photo, {"track: photo", {h, w, 3}});
+  lent const values = lent::of_either<gart::u8, float>(photo, {"track: photo", {h, w, 3}});
+  if (values.holds<gart::u8>())
+    for (std::size_t k = 0; k < values.size(); ++k)
+      out.data[k] = static_cast<float>(values.data<gart::u8>()[k]) / 255.0f;
+  else
     std::copy_n(values.data<float>(), values.size(), out.data.data());
-  }
   return out;
 }
 
@@ -172,6 +153,22 @@ or by name: render(camera, background=(1, 1, 1)); without them they are those th
 
 }  // namespace
 
+python_renderer::python_renderer(py::object const& model, py::kwargs const& given)
+    : request(request_of(given, "Renderer")) {
+  auto const* const file = model.is_none() ? nullptr : &taken<gart::model_file const&>(model, "Renderer: model");
+  if (file && !given.contains("sh_degree")) request.sh_degree = file->model.sh_degree;
+  if (file && !given.contains("kernel_degree")) request.kernel_degree = file->kernel_degree;
+  bool const on_device = gart::resolve(request).backend == gart::backend_kind::cuda;
+  // Without a stream of its own the caller has the legacy default one, which others' work is in order with.
+  if (on_device && !request.stream) request.stream = reinterpret_cast<void*>(std::uintptr_t{1});
+  where = {on_device, request.device, request.stream};
+  py::gil_scoped_release released;
+  it = gart::make_renderer(request);
+  if (!file) return;
+  it->set_model(file->model), usual = file->render;
+  count = std::int64_t(file->model.size()), features = file->model.feature_count;
+}
+
 gart::render_targets targets_of(python_renderer const& r, gart::camera const& view, std::string const& call,
                                 std::array<py::object, 6> const& given, std::vector<lent>& kept) {
   std::int64_t const h = view.height, w = view.width;
@@ -192,33 +189,32 @@ gart::render_targets targets_of(python_renderer const& r, gart::camera const& vi
 gart::configuration_request request_of(py::kwargs const& given, char const* call) {
   gart::configuration_request out;
   for (auto const& [key, value] : given) {
-    auto const name = key.cast<std::string>();
+    auto const name = py::cast<std::string>(key), argument = std::string(call) + ": " + name;
     if (name == "backend")
-      out.backend = named<gart::backend_kind>(value);
+      out.backend = named<gart::backend_kind>(value, argument);
     else if (name == "tracer")
-      out.tracer = named<gart::tracer_kind>(value);
+      out.tracer = named<gart::tracer_kind>(value, argument);
     else if (name == "backward")
-      out.backward = value.cast<std::string>();
+      out.backward = taken<std::string>(value, argument);
     else if (name == "sh_degree")
-      out.sh_degree = value.cast<int>();
+      out.sh_degree = taken<int>(value, argument);
     else if (name == "kernel_degree")
-      out.kernel_degree = value.cast<int>();
+      out.kernel_degree = taken<int>(value, argument);
     else if (name == "hit_format")
-      out.hit_format = named<gart::hit_format_kind>(value);
+      out.hit_format = named<gart::hit_format_kind>(value, argument);
     else if (name == "depth")
-      out.depth = value.cast<bool>();
+      out.depth = taken<bool>(value, argument);
     else if (name == "threads")
-      out.threads = value.cast<int>();
+      out.threads = taken<int>(value, argument);
     else if (name == "device")
-      out.device = value.cast<int>();
-    else if (name == "stream")
-      // 0 is CUDA's legacy default stream, whose handle is 1.
-      out.stream = value.is_none() ? nullptr
-                                   : reinterpret_cast<void*>(std::max<std::uintptr_t>(1, value.cast<std::uintptr_t>()));
-    else
+      out.device = taken<int>(value, argument);
+    else if (name != "stream")
       throw py::type_error(std::string(call) + ": no argument '" + name +
                            "': there are backend, tracer, backward, sh_degree, kernel_degree, hit_format, depth, "
                            "threads, device, stream");
+    else if (!value.is_none())
+      // 0 is CUDA's legacy default stream, whose handle is 1.
+      out.stream = reinterpret_cast<void*>(std::max<std::uintptr_t>(1, taken<std::uintptr_t>(value, argument)));
   }
   return out;
 }
@@ -232,25 +228,26 @@ py::dict as_dict(gart::configuration_info const& info) {
   return out;
 }
 
-void bind_renderer(py::module_& m) {
+renderer_class bind_renderer(py::module_& m) {
   auto const none = py::none();
-  py::class_<self, std::shared_ptr<self>>(m, "Renderer", py::module_local(), class_text)
-      .def(py::init(&make), py::arg("model") = none)
+  renderer_class c(m, "Renderer", class_text);
+  c.def(py::init<py::object const&, py::kwargs const&>(), py::arg("model") = none, py::others("request"))
       .def("set_model", &set_model, py::arg("model"), "Copies the model; arrays that were bound are let go.")
       .def(
           "bind",
           [](self& r, py::object a, py::object b, py::object c, py::object d, py::object e) {
             bind(r, {a, b, c, d, e});
           },
-          py::arg("mean"), py::arg("log_scale"), py::arg("quaternion"), py::arg("opacity"), py::arg("sh"),
+          array_arg("mean"), array_arg("log_scale"), array_arg("quaternion"), array_arg("opacity"), array_arg("sh"),
           R"(Takes float32 arrays in memory of the policy, of Model's shapes, without a copy.
 
 They are kept until another model is set or bound. What is written to them between two views counts for the second.)")
-      .def("bind_features", &bind_features, py::arg("features"),
+      .def("bind_features", &bind_features, array_arg("features"),
            R"(Takes features of each Gaussian, float32 [N, F] in memory of the policy, 1 to 512 of each, without a copy.
 
 They are kept until others are bound, None lets them go, or another model is set or bound.)")
       .def("render", &render, py::arg("camera"), py::arg("options") = none, py::kw_only(), py::arg("features") = false,
+           py::others("settings"),
            R"(A view as a dictionary of new numpy arrays:
 
 color          float32 [H, W, 3], background composited
@@ -258,7 +255,7 @@ transmittance  float32 [H, W]
 depth          float32 [H, W], sum of weight * distance along the ray
 hits           uint32 [H, W], Gaussians composited
 features       float32 [H, W, F], sum of weight * features; with features=True, where there are any)")
-      .def("render_8bit", &render_8bit, py::arg("camera"), py::arg("options") = none,
+      .def("render_8bit", &render_8bit, py::arg("camera"), py::arg("options") = none, py::others("settings"),
            "The colours of a view as a new numpy array, uint8 [H, W, 3].")
       .def(
           "render_to",
@@ -268,9 +265,10 @@ features       float32 [H, W, F], sum of weight * features; with features=True, 
           },
           py::arg("camera"), py::arg("options") = none, py::kw_only(), py::arg("color") = none,
           py::arg("transmittance") = none, py::arg("depth") = none, py::arg("hits") = none, py::arg("rgba") = none,
-          py::arg("features") = none, "A view into memory of the policy, of render's shapes; rgba is uint8 [H, W, 4].")
-      .def("backward", &backward, py::arg("camera"), py::arg("color_gradient"), py::arg("options") = none,
-           py::kw_only(), py::arg("pose") = false,
+          py::arg("features") = none, py::others("settings"),
+          "A view into memory of the policy, of render's shapes; rgba is uint8 [H, W, 4].")
+      .def("backward", &backward, py::arg("camera"), array_arg("color_gradient"), py::arg("options") = none,
+           py::kw_only(), py::arg("pose") = false, py::others("settings"),
            R"(Both passes of a view, for dL/dcolour as float32 [H, W, 3] on the host.
 
 A dictionary of new numpy arrays, dL/d mean, log_scale, quaternion, opacity and sh of Model's shapes; with pose=True
@@ -290,14 +288,14 @@ small turn w of the camera about its position, world axes: a direction d becomes
           },
           py::arg("enable") = true,
           "Times by stage since the last call, as (milliseconds, launches); from the first call on.")
-      .def_property_readonly("configuration", [](self const& r) { return as_dict(r.it->configuration()); })
-      .def_property_readonly(
+      .def_prop_ro("configuration", [](self const& r) { return as_dict(r.it->configuration()); })
+      .def_prop_ro(
           "peak_bytes", [](self const& r) { return r.it->peak_bytes(); },
           "Most bytes of the policy's memory that were in use at a time.")
       .def("__len__", [](self const& r) { return r.count; });
 
-  m.def("track", &track, py::arg("renderer"), py::arg("photo"), py::arg("guess"), py::arg("options") = none,
-        py::kw_only(), py::arg("steps") = 60, py::arg("blur") = 0.05f, py::arg("mask") = none,
+  m.def("track", &track, py::arg("renderer"), array_arg("photo"), py::arg("guess"), py::arg("options") = none,
+        py::kw_only(), py::arg("steps") = 60, py::arg("blur") = 0.05f, py::arg("mask") = none, py::others("settings"),
         R"(Where a photograph was taken, from the renderer's model and a guess.
 
 photo  float32 [H, W, 3] in [0, 1], or uint8, of the guess's size
@@ -317,6 +315,7 @@ Returns the camera that was found, and the root mean squared error after each st
         return out;
       },
       "All configurations that were compiled in.");
+  return c;
 }
 
 }  // namespace gart_python

@@ -25,12 +25,16 @@ pose pose_of(gart::camera const& c) {
 
 // From any object that numpy can make a matrix of 3 or 4 rows of 4 of.
 void set_pose(gart::camera& c, py::handle c2w) {
-  auto const matrix = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(c2w);
-  if (!matrix || matrix.ndim() != 2 || matrix.shape(1) != 4 || (matrix.shape(0) != 3 && matrix.shape(0) != 4)) {
-    PyErr_Clear();
-    throw gart::invalid_argument("Camera: c2w must be a matrix of 4 x 4 or 3 x 4 numbers, camera to world");
+  py::object const numpy = py::imported("numpy");
+  lent matrix;
+  try {
+    matrix = lent::of<double>(numpy.attr("ascontiguousarray")(c2w, "float64"), {"Camera: c2w", {-1, 4}});
+  } catch (py::python_error const&) {
+  } catch (gart::invalid_argument const&) {
   }
-  double const* m = matrix.data();
+  if (matrix.shape().empty() || (matrix.shape()[0] != 3 && matrix.shape()[0] != 4))
+    throw gart::invalid_argument("Camera: c2w must be a matrix of 4 x 4 or 3 x 4 numbers, camera to world");
+  double const* m = matrix.data<double>();
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) c.rotation[column][row] = static_cast<float>(m[4 * row + column]);
     c.position[row] = m[4 * row + 3];
@@ -73,12 +77,12 @@ py::object shown_parameter(gart::gaussian_model const& model, char const* name, 
   gart::for_each_array(
       [&](gart::parameter_array const& a, auto const& values) {
         if (std::strcmp(a.name, name) != 0) return;
-        std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(model.size())};
+        std::vector<std::int64_t> shape{static_cast<std::int64_t>(model.size())};
         if (a.number == gart::sh_array)
           shape.insert(shape.end(), {gart::sh_coefficients(model.sh_degree), 3});
         else if (a.floats > 1)
           shape.push_back(a.floats);
-        out = shown_array(std::move(shape), values.data(), owner);
+        out = shown_array(shape, values.data(), owner);
       },
       model);
   return out;
@@ -106,15 +110,15 @@ gart::gaussian_model model_of(py::handle mean, py::handle log_scale, py::handle 
 gart::camera camera_of(int width, int height, double fx, double fy, std::optional<double> cx, std::optional<double> cy,
                        py::object const& c2w, std::string const& model, py::kwargs const& lens) {
   gart::camera c;
-  if (model != "PINHOLE" || !lens.empty()) {
+  if (model != "PINHOLE" || lens.size() > 0) {
     // As a file has it, so that names and ranges are the library's.
     py::dict record;
     record["width"] = width, record["height"] = height, record["fx"] = fx, record["fy"] = fy;
     record["cx"] = cx.value_or(width / 2.0), record["cy"] = cy.value_or(height / 2.0);
     record["camera_model"] = model;
-    record["c2w"] = py::module_::import("json").attr("loads")("[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]");
+    record["c2w"] = py::imported("json").attr("loads")("[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]");
     for (auto const& [name, value] : lens) record[name] = value;
-    auto const text = py::module_::import("json").attr("dumps")(record).cast<std::string>();
+    auto const text = py::cast<std::string>(py::imported("json").attr("dumps")(record));
     c = gart::parse_camera_json(text, "Camera").view;
   } else {
     if (width < 1 || height < 1 || width > 1000000 || height > 1000000)
@@ -130,17 +134,17 @@ gart::camera camera_of(int width, int height, double fx, double fy, std::optiona
 }
 
 void bind_scene(py::module_& m) {
-  py::class_<gart::camera>(m, "Camera", py::module_local(), camera_text)
-      .def(py::init(&camera_of), py::arg("width"), py::arg("height"), py::arg("fx"), py::arg("fy"),
+  py::class_<gart::camera>(m, "Camera", camera_text)
+      .def(py::made_by(&camera_of), py::arg("width"), py::arg("height"), py::arg("fx"), py::arg("fy"),
            py::arg("cx") = py::none(), py::arg("cy") = py::none(), py::arg("c2w") = py::none(),
-           py::arg("model") = "PINHOLE")
-      .def_readwrite("width", &gart::camera::width, "pixels")
-      .def_readwrite("height", &gart::camera::height, "pixels")
-      .def_readwrite("fx", &gart::camera::fx, "pixels")
-      .def_readwrite("fy", &gart::camera::fy, "pixels")
-      .def_readwrite("cx", &gart::camera::cx, "pixels")
-      .def_readwrite("cy", &gart::camera::cy, "pixels")
-      .def_property(
+           py::arg("model") = "PINHOLE", py::others("lens"))
+      .def_rw("width", &gart::camera::width, "pixels")
+      .def_rw("height", &gart::camera::height, "pixels")
+      .def_rw("fx", &gart::camera::fx, "pixels")
+      .def_rw("fy", &gart::camera::fy, "pixels")
+      .def_rw("cx", &gart::camera::cx, "pixels")
+      .def_rw("cy", &gart::camera::cy, "pixels")
+      .def_prop_rw(
           "c2w",
           [](gart::camera const& c) {
             return owned_array({4, 4}, std::vector<double>([&] {
@@ -149,10 +153,10 @@ void bind_scene(py::module_& m) {
                                }()));
           },
           &set_pose, "camera to world, float64 [4, 4]; reading makes a copy")
-      .def_property_readonly(
+      .def_prop_ro(
           "model", [](gart::camera const& c) { return gart::fields_of(c).model; },
           "COLMAP's name of the camera's model")
-      .def_property_readonly(
+      .def_prop_ro(
           "parameters",
           [](gart::camera const& c) {
             py::dict out;
@@ -179,10 +183,11 @@ void bind_scene(py::module_& m) {
       });
 
   using file = gart::model_file;
-  py::class_<file, std::shared_ptr<file>> model(m, "Model", py::module_local(), model_text);
+  py::class_<file, std::shared_ptr<file>> model(m, "Model", model_text);
   model
-      .def(py::init([](py::object const& mean, py::object const& log_scale, py::object const& quaternion,
-                       py::object const& opacity, py::object const& sh, int kernel_degree, py::object const& features) {
+      .def(py::made_by([](py::object const& mean, py::object const& log_scale, py::object const& quaternion,
+                          py::object const& opacity, py::object const& sh, int kernel_degree,
+                          py::object const& features) {
              file out;
              out.model = model_of(mean, log_scale, quaternion, opacity, sh, "Model");
              out.total = out.model.size(), out.kernel_degree = kernel_degree;
@@ -192,29 +197,29 @@ void bind_scene(py::module_& m) {
                out.model.features.assign(given.data<float>(), given.data<float>() + given.size());
                out.model.feature_count = static_cast<int>(given.shape()[1]);
              }
-             return std::make_shared<file>(std::move(out));
+             return out;
            }),
-           py::arg("mean"), py::arg("log_scale"), py::arg("quaternion"), py::arg("opacity"), py::arg("sh"),
+           array_arg("mean"), array_arg("log_scale"), array_arg("quaternion"), array_arg("opacity"), array_arg("sh"),
            py::arg("kernel_degree") = 2, py::arg("features") = py::none())
-      .def_property_readonly(
+      .def_prop_ro(
           "features",
           [](py::object const& self) -> py::object {
-            gart::gaussian_model const& m = self.cast<file const&>().model;
+            gart::gaussian_model const& m = py::cast<file const&>(self).model;
             if (m.feature_count == 0) return py::none();
-            return shown_array({static_cast<py::ssize_t>(m.size()), m.feature_count}, m.features.data(), self);
+            return shown_array({static_cast<std::int64_t>(m.size()), m.feature_count}, m.features.data(), self);
           },
           "float32 [N, F], in PLY alone; None where there are none")
       .def("__len__", [](file const& f) { return f.model.size(); })
-      .def_property_readonly("sh_degree", [](file const& f) { return f.model.sh_degree; })
-      .def_readonly("kernel_degree", &file::kernel_degree, "2: Gaussians")
-      .def_property_readonly(
+      .def_prop_ro("sh_degree", [](file const& f) { return f.model.sh_degree; })
+      .def_ro("kernel_degree", &file::kernel_degree, "2: Gaussians")
+      .def_prop_ro(
           "origin",
           [](file const& f) {
             return std::array{f.origin.x, f.origin.y, f.origin.z};
           },
           "what coordinates are relative to")
-      .def_readwrite("render", &file::render, "what the model was trained to be rendered with")
-      .def_readonly("notes", &file::notes, "a line for each kind of Gaussian that was left out of the file")
+      .def_rw("render", &file::render, "what the model was trained to be rendered with")
+      .def_ro("notes", &file::notes, "a line for each kind of Gaussian that was left out of the file")
       .def(
           "with_sh_degree",
           [](file const& f, int degree) {
@@ -228,8 +233,9 @@ void bind_scene(py::module_& m) {
                std::to_string(f.model.sh_degree) + ")";
       });
   for (char const* name : {"mean", "log_scale", "quaternion", "opacity", "sh"})
-    model.def_property_readonly(
-        name, [name](py::object const& self) { return shown_parameter(self.cast<file const&>().model, name, self); });
+    model.def_prop_ro(name, [name](py::object const& self) {
+      return shown_parameter(py::cast<file const&>(self).model, name, self);
+    });
 
   m.def(
       "load_model",

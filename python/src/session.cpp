@@ -14,6 +14,9 @@ namespace {
 using shared_dataset = std::shared_ptr<gart::dataset>;
 
 struct python_session {
+  python_session(shared_dataset const& over, py::object const& options, py::object const& start,
+                 py::kwargs const& given);
+
   shared_dataset data;  // outlives the session
   std::unique_ptr<gart::session> it;
   gart::train_options options;
@@ -22,20 +25,21 @@ struct python_session {
 };
 using self = python_session;
 
-std::unique_ptr<self> make(shared_dataset const& data, py::object const& options, py::object const& start,
-                           py::kwargs const& given) {
-  auto out = std::make_unique<self>();
-  out->data = data;
-  if (!options.is_none()) out->options = options.cast<gart::train_options>();
+gart::train_options train_options_of(py::object const& given, char const* name) {
+  return given.is_none() ? gart::train_options{} : taken<gart::train_options>(given, name);
+}
+
+python_session::python_session(shared_dataset const& over, py::object const& given_options, py::object const& start,
+                               py::kwargs const& given)
+    : data(over), options(train_options_of(given_options, "Session: options")) {
   gart::configuration_request request = request_of(given, "Session");
-  gart::model_file const* const file = start.is_none() ? nullptr : &start.cast<gart::model_file const&>();
+  auto const* const file = start.is_none() ? nullptr : &taken<gart::model_file const&>(start, "Session: start");
   if (file && !given.contains("sh_degree")) request.sh_degree = file->model.sh_degree;
-  out->kernel_degree = request.kernel_degree;
+  kernel_degree = request.kernel_degree;
   py::gil_scoped_release released;
   gart::gaussian_model from;  // where the capture is
   if (file) from = file->model, gart::move_origin(from, file->origin, data->origin);
-  out->it = gart::make_session(request, out->options, *data, file ? &from : nullptr);
-  return out;
+  it = gart::make_session(request, options, *data, file ? &from : nullptr);
 }
 
 gart::step_report step(self& s, int steps) {
@@ -92,7 +96,7 @@ py::dict evaluate_renderer(python_renderer& r, std::vector<std::shared_ptr<gart:
 
 std::pair<gart::train_options, py::dict> recommended(shared_dataset const& data, py::object const& options,
                                                      py::kwargs const& given) {
-  gart::train_options const base = options.is_none() ? gart::train_options{} : options.cast<gart::train_options>();
+  gart::train_options const base = train_options_of(options, "recommended: options");
   gart::configuration_request const request = request_of(given, "recommended");
   gart::recommendation found;
   {
@@ -114,22 +118,23 @@ Model to begin with, else the dataset's points or random ones. Calls drop the in
 }  // namespace
 
 void bind_session(py::module_& m) {
-  py::class_<gart::step_report>(m, "StepReport", py::module_local(), "What a step says of itself.")
-      .def_readonly("step", &gart::step_report::step, "steps done, this one included")
-      .def_readonly("loss", &gart::step_report::loss, "of this step's view")
-      .def_readonly("psnr", &gart::step_report::psnr, "of this step's view, dB")
-      .def_readonly("gaussians", &gart::step_report::gaussians, "after the step")
-      .def_readonly("view", &gart::step_report::view, "its name")
-      .def_readonly("backward", &gart::step_report::backward, "the strategy of this step")
-      .def_readonly("skipped", &gart::step_report::skipped, "with check_finite: numbers that Adam left as they were")
+  py::class_<gart::step_report>(m, "StepReport", "What a step says of itself.")
+      .def_ro("step", &gart::step_report::step, "steps done, this one included")
+      .def_ro("loss", &gart::step_report::loss, "of this step's view")
+      .def_ro("psnr", &gart::step_report::psnr, "of this step's view, dB")
+      .def_ro("gaussians", &gart::step_report::gaussians, "after the step")
+      .def_ro("view", &gart::step_report::view, "its name")
+      .def_ro("backward", &gart::step_report::backward, "the strategy of this step")
+      .def_ro("skipped", &gart::step_report::skipped, "with check_finite: numbers that Adam left as they were")
       .def("__repr__", [](gart::step_report const& r) {
         return "gart.StepReport(step=" + std::to_string(r.step) + ", loss=" + std::to_string(r.loss) +
                ", psnr=" + std::to_string(r.psnr) + ", gaussians=" + std::to_string(r.gaussians) + ")";
       });
-  py::class_<self>(m, "Session", py::module_local(), class_text)
-      .def(py::init(&make), py::arg("dataset"), py::arg("options") = py::none(), py::arg("start") = py::none())
+  py::class_<self>(m, "Session", class_text)
+      .def(py::init<shared_dataset const&, py::object const&, py::object const&, py::kwargs const&>(),
+           py::arg("dataset"), py::arg("options") = py::none(), py::arg("start") = py::none(), py::others("request"))
       .def("step", &step, py::arg("steps") = 1, "Steps of training; the report of the last.")
-      .def_property_readonly(
+      .def_prop_ro(
           "steps_done", [](self const& s) { return s.it->steps_done(); },
           "Of this run and, where it was resumed, of those before.")
       .def(
@@ -175,16 +180,17 @@ void bind_session(py::module_& m) {
             return out;
           },
           "(name, Camera) of the training views as they are learned; empty where neither poses nor lenses are.")
-      .def_property_readonly(
+      .def_prop_ro(
           "options", [](self const& s) { return s.options; }, "a copy")
-      .def_property_readonly("dataset", [](self const& s) { return s.data; })
-      .def_property_readonly("configuration", [](self const& s) { return as_dict(s.it->configuration()); })
-      .def_property_readonly("peak_bytes", [](self const& s) { return s.it->peak_bytes(); });
+      .def_prop_ro("dataset", [](self const& s) { return s.data; })
+      .def_prop_ro("configuration", [](self const& s) { return as_dict(s.it->configuration()); })
+      .def_prop_ro("peak_bytes", [](self const& s) { return s.it->peak_bytes(); });
   m.def("evaluate", &evaluate_renderer, py::arg("renderer"), py::arg("views"), py::arg("options") = py::none(),
+        py::others("settings"),
         R"(Scores of a renderer's model against photographs: {"psnr", "ssim", "views"}, means and each.
 
 views  a list of View, as dataset.test; options as of Renderer.render)");
-  m.def("recommended", &recommended, py::arg("dataset"), py::arg("options") = py::none(),
+  m.def("recommended", &recommended, py::arg("dataset"), py::arg("options") = py::none(), py::others("request"),
         R"(What a capture asks for, measured in short trainings, as `gart train` takes it.
 
 Returns TrainOptions and a dictionary of arguments for Session.)");
