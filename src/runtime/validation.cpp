@@ -27,6 +27,8 @@ constexpr int fewest_steps = 700, most_steps = 2000;
 constexpr double step_share = 0.4, run_share = 0.1;
 // Adam's rate of exposures in a trial, at most. A trial visits a view a few times, where whole steps overshoot.
 constexpr float trial_exposure_rate = 0.015f;
+// dB of the gain of fewer steps, which small images show too little.
+constexpr double trial_understates = 1;
 // Small images leave a GPU idle between kernels. Trials beside each other fill it: each adds about this share of the
 // time that it takes alone.
 constexpr double beside_share = 0.5;
@@ -201,7 +203,7 @@ class trial_round {
     std::vector<double> gains;
     for (std::size_t v = 0; v < psnr.size(); ++v) gains.push_back(psnr[v] - without[v]);
     trial tried{c.setting, c.value, mean(psnr), mean(gains), standard_error(gains)};
-    tried.taken = tried.is_better(c.least_noises);
+    tried.taken = tried.is_better(c.least_noises, c.understated);
     if (tried.taken) c.take(result_.options);
     result_.trials.push_back(tried);
   }
@@ -226,7 +228,8 @@ std::vector<candidate> default_candidates(capture_traits const& traits, train_op
       growth_budget(more, most, traits.pixels) > growth_budget(options.error, most, traits.pixels))
     all.push_back({"error.pixels_per_gaussian", "100", [](train_options& o) { o.error.pixels_per_gaussian = 100; }});
   int const third = options.iterations / validation_plan::long_trial;
-  all.push_back({"iterations", std::to_string(third), [third](train_options& o) { o.iterations = third; }, -2, true});
+  all.push_back({"iterations", std::to_string(third), [third](train_options& o) { o.iterations = third; }, 1,
+                 trial_understates, true});
   return all;
 }
 

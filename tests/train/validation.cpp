@@ -181,6 +181,8 @@ TEST_CASE("a gain counts above its noise and above a tie") {
   CHECK(t.is_better(-2));
   t.noise = 0.4;
   CHECK(!t.is_better(-2));
+  CHECK(t.is_better(1, 1.5));
+  CHECK(!t.is_better(1, 1.3));
 }
 
 TEST_CASE("what changes nothing of a run is no candidate") {
