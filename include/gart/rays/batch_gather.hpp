@@ -98,6 +98,60 @@ struct sum_targets {
   GART_HD GART_INLINE static void put(float* to, vec3 const& v) { to[0] = v.x, to[1] = v.y, to[2] = v.z; }
 };
 
+// What a hit adds. A lane's share is a factor times three floats: of a band and the colour, or of 1 and moments.
+struct hit_terms {
+  float factor[sum_row::bands + 4];
+  quad three[1 + moment_stride / 3];
+};
+
+// The sums of a Gaussian as hits are added. A lane of a device has its three floats in registers. A host has an array
+// of each of the three, so that the compiler adds many bands at once.
+class growing_row {
+ public:
+  GART_HD GART_INLINE void clear() {
+#if defined(__CUDA_ARCH__)
+    sum_ = vec3(0.0f);
+#else
+    for (int l = 0; l < sum_row::lanes; ++l) x_[l] = y_[l] = z_[l] = 0;
+#endif
+  }
+  GART_HD GART_INLINE void add(hit_terms const& hit) {
+    constexpr int bands = sum_row::bands;
+#if defined(__CUDA_ARCH__)
+    each_lane([&](int l) {
+      if (l >= sum_row::lanes) return;
+      float const f = hit.factor[l < bands ? l : bands];
+      quad const three = hit.three[l < bands ? 0 : l - bands + 1];
+      sum_ += f * vec3(three.v[0], three.v[1], three.v[2]);
+    });
+#else
+    quad const color = hit.three[0];
+    for (int b = 0; b < bands; ++b) x_[b] += hit.factor[b] * color.v[0];
+    for (int b = 0; b < bands; ++b) y_[b] += hit.factor[b] * color.v[1];
+    for (int b = 0; b < bands; ++b) z_[b] += hit.factor[b] * color.v[2];
+    for (int i = 0; i < sum_row::lanes - bands; ++i) {
+      quad const moments = hit.three[1 + i];
+      x_[bands + i] += moments.v[0], y_[bands + i] += moments.v[1], z_[bands + i] += moments.v[2];
+    }
+#endif
+  }
+  // Of a lane; on a device of the calling one.
+  GART_HD GART_INLINE vec3 of([[maybe_unused]] int lane) const {
+#if defined(__CUDA_ARCH__)
+    return sum_;
+#else
+    return vec3(x_[lane], y_[lane], z_[lane]);
+#endif
+  }
+
+ private:
+#if defined(__CUDA_ARCH__)
+  vec3 sum_;
+#else
+  float x_[sum_row::lanes], y_[sum_row::lanes], z_[sum_row::lanes];
+#endif
+};
+
 // Lanes take a hit each and put down what it adds. Then they take three floats of the row each and go through the hits.
 // So all lanes work, however few hits a Gaussian has, and a row is written at once.
 template <class Response, class Hits>
@@ -112,11 +166,6 @@ struct sum_tile {
   sum_targets out;
   sum_row* parts;  // [tiles][2]: of a Gaussian that began before, of one that ends after
 
-  // A lane's share is a factor times three floats: of a band and the colour, or of 1 and moments.
-  struct hit_terms {
-    float factor[bands + 4];
-    quad three[1 + moment_stride / 3];
-  };
   struct scratch {
     hit_terms hits[beam_lanes];
     u32 ids[beam_lanes];
@@ -125,7 +174,7 @@ struct sum_tile {
   GART_KERNEL void operator()(auto const& team) const {
     scratch& s = team.scratch();
     hit_tile const tile(hits.ids, count, team.tile());
-    per_lane<vec3> sum;
+    growing_row sum;
     u32 id = hit_tile::none;
     for (index_t k = tile.first; k < tile.end; k += beam_lanes) {
       int const n = tile.end - k < beam_lanes ? static_cast<int>(tile.end - k) : beam_lanes;
@@ -134,16 +183,8 @@ struct sum_tile {
       });
       team.barrier();
       for (int j = 0; j < n; ++j) {
-        bool const other = s.ids[j] != id;
-        if (other) write(team.tile(), tile, id, sum), id = s.ids[j];
-        hit_terms const& hit = s.hits[j];
-        each_lane([&](int l) {
-          if (l >= sum_row::lanes) return;
-          float const f = hit.factor[l < bands ? l : bands];
-          quad const three = hit.three[l < bands ? 0 : l - bands + 1];
-          if (other) sum[l] = vec3(0.0f);
-          sum[l] += f * vec3(three.v[0], three.v[1], three.v[2]);
-        });
+        if (s.ids[j] != id) write(team.tile(), tile, id, sum), id = s.ids[j], sum.clear();
+        sum.add(s.hits[j]);
       }
       team.barrier();
     }
@@ -151,14 +192,14 @@ struct sum_tile {
   }
 
  private:
-  GART_HD GART_INLINE void write(index_t number, hit_tile const& tile, u32 id, per_lane<vec3>& sum) const {
+  GART_HD GART_INLINE void write(index_t number, hit_tile const& tile, u32 id, growing_row const& sum) const {
     if (id >= out.gaussians) return;
     each_lane([&](int l) {
       if (l >= sum_row::lanes) return;
       if (id == tile.before || id == tile.after)
-        out.put(parts[std::size_t{2} * number + (id != tile.before)].v + 3 * l, sum[l]);
+        out.put(parts[std::size_t{2} * number + (id != tile.before)].v + 3 * l, sum.of(l));
       else
-        out.write(id, l, sum[l]);
+        out.write(id, l, sum.of(l));
     });
   }
   // Of a hit; its Gaussian.
