@@ -204,6 +204,8 @@ TEST_CASE("what changes nothing of a run is no candidate") {
   CHECK(gart::default_candidates(traits, of).back().shortens);
   for (auto const& c : gart::default_candidates({}, {})) c.take(of);
   CHECK(of.iterations == 10000);
+  of.refine_poses = true;
+  CHECK(!gart::default_candidates(traits, of).back().shortens);
   CHECK(of.exposure);
   CHECK(of.vignetting);
 }

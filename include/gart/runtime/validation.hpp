@@ -50,7 +50,7 @@ struct candidate {
 
 /// The candidates that pay on some captures and cost on others, most useful first. Candidates without effect on this
 /// capture are left out. Images of the whole sphere have no vignetting, and some budgets do not depend on pixels.
-/// Those that shorten the run are last.
+/// Those that shorten the run are last; a run that learns poses, lenses or depth has none.
 std::vector<candidate> default_candidates(capture_traits const& traits, train_options const& options);
 
 /// How candidates are tried.
