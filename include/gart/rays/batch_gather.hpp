@@ -108,23 +108,19 @@ struct hit_terms {
 // of each of the three, so that the compiler adds many bands at once.
 class growing_row {
  public:
-  GART_HD GART_INLINE void clear() {
-#if defined(__CUDA_ARCH__)
-    sum_ = vec3(0.0f);
-#else
-    for (int l = 0; l < sum_row::lanes; ++l) x_[l] = y_[l] = z_[l] = 0;
-#endif
-  }
-  GART_HD GART_INLINE void add(hit_terms const& hit) {
+  // `first`: of another Gaussian than the hit before.
+  GART_HD GART_INLINE void add(hit_terms const& hit, bool first) {
     constexpr int bands = sum_row::bands;
 #if defined(__CUDA_ARCH__)
     each_lane([&](int l) {
       if (l >= sum_row::lanes) return;
       float const f = hit.factor[l < bands ? l : bands];
       quad const three = hit.three[l < bands ? 0 : l - bands + 1];
+      if (first) sum_ = vec3(0.0f);
       sum_ += f * vec3(three.v[0], three.v[1], three.v[2]);
     });
 #else
+    for (int l = 0; first && l < sum_row::lanes; ++l) x_[l] = y_[l] = z_[l] = 0;
     quad const color = hit.three[0];
     for (int b = 0; b < bands; ++b) x_[b] += hit.factor[b] * color.v[0];
     for (int b = 0; b < bands; ++b) y_[b] += hit.factor[b] * color.v[1];
@@ -183,8 +179,9 @@ struct sum_tile {
       });
       team.barrier();
       for (int j = 0; j < n; ++j) {
-        if (s.ids[j] != id) write(team.tile(), tile, id, sum), id = s.ids[j], sum.clear();
-        sum.add(s.hits[j]);
+        bool const other = s.ids[j] != id;
+        if (other) write(team.tile(), tile, id, sum), id = s.ids[j];
+        sum.add(s.hits[j], other);
       }
       team.barrier();
     }
