@@ -92,8 +92,8 @@ struct rough_surface {
   }
 };
 
-// The table, by a sum over visible normals. About 20 ms.
-inline std::vector<vec2> specular_albedos() {
+// The table's numbers, by a sum over visible normals. About 20 ms.
+inline std::vector<vec2> sum_specular_albedos() {
   constexpr int steps = 32;
   std::vector<vec2> out;
   for (int j = 0; j < specular_side; ++j)
@@ -116,6 +116,12 @@ inline std::vector<vec2> specular_albedos() {
       out.push_back({static_cast<float>(all / (steps * steps)), static_cast<float>(rim / (steps * steps))});
     }
   return out;
+}
+
+// The table, which a process computes once.
+inline std::vector<vec2> const& specular_albedos() {
+  static std::vector<vec2> const all = sum_specular_albedos();
+  return all;
 }
 
 // Where a path meets a triangle.
