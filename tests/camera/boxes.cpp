@@ -38,7 +38,7 @@ constexpr size_class classes[] = {{0.001, 0.01, 1.01}, {0.01, 0.1, 1.05}, {0.1, 
 
 long count() {
   char const* const text = std::getenv("GART_TEST_COUNT");
-  return text ? std::atol(text) : 1000;
+  return text ? std::atol(text) : 400;
 }
 
 }  // namespace

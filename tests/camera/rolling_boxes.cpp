@@ -16,7 +16,7 @@ using namespace gart_test;
 
 constexpr double pi = 3.14159265358979323846;
 constexpr int side = 900;
-constexpr long each_view = 12;  // ellipsoids: boxes of a new camera take longer to set up
+constexpr long each_view = 48;  // ellipsoids: boxes of a new camera take longer to set up
 
 struct size_class {
   double least, most, bar;
@@ -178,7 +178,7 @@ std::optional<seen_box> seen_around(moving_case const& c) {
 TEST_CASE("no silhouette leaves its tight box while the camera moves") {
   char const* const text = std::getenv("GART_TEST_COUNT");
   // A mean of few varies by more than the bars leave.
-  long const count = text ? std::atol(text) : 120, averaged = std::max(count, 2400l);
+  long const count = text ? std::atol(text) : 60, averaged = std::max(count, 2400l);
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   for (char const* name : {"FULL_OPENCV", "OPENCV_FISHEYE", "EQUIRECTANGULAR"})
