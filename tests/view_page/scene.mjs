@@ -8,6 +8,8 @@ import {along, minus, pixelOf, splatPly} from './geometry.mjs';
 import {onEach} from './screens.mjs';
 
 const samples = 2;
+// Cases that change the scene wait for each image, so theirs are traced by one sample.
+const once = {samples: 1, bounces: 1};
 const description = {
   models: [{file: 'among.ply'}],
   meshes: [{name: 'ball', shape: 'sphere', scale: 0.4}, {name: 'floor', shape: 'plane', translation: [0, 1, 0], scale: 2}],
@@ -15,11 +17,11 @@ const description = {
   options: {samples, bounces: 2, tone_map: 'srgb'},
 };
 
-async function serve({gart, work}) {
+async function serve({gart, work}, options) {
   // Each twice: the bounds leave out the last in a hundred.
   const balls = [[-1, 0, 0, 0.2, [0.9, 0.2, 0.2]], [1, 0.3, 0.4, 0.25, [0.2, 0.6, 0.9]], [0, -1, 0, 0.15, [0.3, 0.8, 0.3]]];
   fs.writeFileSync(path.join(work, 'among.ply'), splatPly([...balls, ...balls]));
-  fs.writeFileSync(path.join(work, 'scene.json'), JSON.stringify(description));
+  fs.writeFileSync(path.join(work, 'scene.json'), JSON.stringify({...description, options: {...description.options, ...options}}));
   return gart.serve('view', '--scene', 'scene.json', '--backend', 'openmp');
 }
 async function end(server) {
@@ -29,7 +31,7 @@ async function end(server) {
 
 // A page whose list has the ball chosen; at(): where the stage shows a point.
 async function openBall(world, screen) {
-  const server = await serve(world);
+  const server = await serve(world, once);
   const p = await openPage(world.browser, server.control, screen);
   await p.tab('scene');
   await p.page.click('#scene-list button:has-text("ball")');
@@ -170,7 +172,7 @@ const turned = onEach({
 
 const added = onEach({
   async 'a mesh that is dropped or chosen is in the scene, what is wrong is said'(world, screen) {
-    const server = await serve(world), {browser} = world;
+    const server = await serve(world, once), {browser} = world;
     const p = await openPage(browser, server.control, screen);
     await p.tab('scene');
     const said = (part) => p.until(`"${part}"`, async () => (await p.page.textContent('#say')).includes(part));
@@ -186,7 +188,7 @@ const added = onEach({
     await p.until('another image', async () => !(await p.rest()).jpeg.equals(before.jpeg));
     await p.page.setInputFiles('#add-file', {name: 'again.obj', mimeType: 'text/plain', buffer: Buffer.from('v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n')});
     await said('again.obj is in the scene');
-    assert.equal(await p.page.locator('#scene-list li').count(), 5);
+    await p.until('five parts', async () => (await p.page.locator('#scene-list li').count()) === 5);
     await drop('broken.obj', 'v 0 0\nf 1 2 3\n');
     await said('broken.obj could not be added');
     await drop('notes.txt', 'hello');
