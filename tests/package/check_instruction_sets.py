@@ -6,15 +6,12 @@ and the library share each inline function and template of one name: where the n
 runs the other's, and its images are black, or it crashes.
 
 A program trains with the templates of the README (every method, SH 3) beside every configuration of
-make_renderer and make_session. By default: the library that was built here, and one for another instruction set;
-consumers for none and native at -O0, and one at -O2: nvcc's host code, or that for none where there is no nvcc; the
-linker finding the library first, and last.
-GART_TEST_ALL_INSTRUCTION_SETS=1 takes every pair of {none, x86-64-v3, native} at both levels, and SH 0 to 3. One thread,
-because then the sums have one order.
+make_renderer and make_session. By default: the library that was built here; consumers for none and native at -O0, and
+one at -O2: nvcc's host code, or that for none where there is no nvcc; the linker finding the library first, and last.
+GART_TEST_ALL_INSTRUCTION_SETS=1 compiles two libraries more. It takes every pair of {none, x86-64-v3, native} at both
+levels, and SH 0 to 3. One thread, because then the sums have one order.
 
-The other library is compiled at -O0: nothing is inlined, so more names are shared, and it takes half of the time.
-Each library has a libgart_runtime.a of its own instruction set, but by default one libgart_io.a is linked with all: no
-program here reads or writes a file, and a linker takes of it, the last, only what nothing else has.
+The other libraries are compiled at -O0: nothing is inlined, so more names are shared, and it takes half of the time.
 
 Values are compared where a program happens to have them. So the objects for none and for native at -O0, which inlines
 nothing, are also searched for symbols that both have: none may have come out with a fused multiply-add, or with lanes.
@@ -94,7 +91,7 @@ def shared_code(one, other, program):
 with tempfile.TemporaryDirectory() as temporary:
     folder = pathlib.Path(temporary)
     own = (a.march.removeprefix("-march=") or "none")
-    libraries = [own] + [s for s in ("x86-64-v3", "native", "none") if s != own][:2 if every else 1]
+    libraries = [own] + [s for s in ("x86-64-v3", "native", "none") if s != own][:2 if every else 0]
     consumers = ["none"] + (["x86-64-v3"] if every else []) + ["native"] + (["nvcc"] if a.nvcc else [])
 
     run(a.cmake, "--install", a.build, "--prefix", folder / own)
@@ -106,8 +103,7 @@ with tempfile.TemporaryDirectory() as temporary:
             "-DGART_BUILD_PROGRAM=OFF", "-DGART_BUILD_EXAMPLES=OFF",
             "-DCMAKE_OPTIMIZE_DEPENDENCIES=ON",  # an archive waits for none that it only names
             "-DGART_BUILD_TESTS=OFF", f"-DGART_SANITIZE={'ON' if a.sanitize else 'OFF'}")
-        own_parts = ["gart_cpu", "gart_runtime"] + (["gart_io"] if every else [])
-        run(a.cmake, "--build", binary, "--parallel", a.jobs, "--target", *own_parts)
+        run(a.cmake, "--build", binary, "--parallel", a.jobs, "--target", "gart_cpu", "gart_runtime", "gart_io")
     archives = {}
     for library in libraries:
         archives[library] = folder / "archives" / library
