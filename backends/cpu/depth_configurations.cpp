@@ -7,6 +7,4 @@ namespace {
 using tracer = gart::tile_tracer<gart::openmp_exec>;
 }  // namespace
 
-GART_REGISTER_CONFIGURATIONS(
-    gart_openmp_depth_configurations,
-    gart::register_degree_3<gart::openmp_exec, tracer, gart::with_depth<gart::primitive_method>>(16))
+GART_REGISTER_CONFIGURATIONS(gart_openmp_depth_configurations, gart::register_depth<gart::openmp_exec, tracer>(16))

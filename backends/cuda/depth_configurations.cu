@@ -8,6 +8,5 @@ using tracer = gart::tile_tracer<gart::cuda_exec>;
 bool device_available(std::string* reason) { return !gart::cuda_devices(reason).empty(); }
 }  // namespace
 
-GART_REGISTER_CONFIGURATIONS(
-    gart_cuda_depth_configurations,
-    gart::register_degree_3<gart::cuda_exec, tracer, gart::with_depth<gart::primitive_method>>(20, device_available))
+GART_REGISTER_CONFIGURATIONS(gart_cuda_depth_configurations,
+                             gart::register_depth<gart::cuda_exec, tracer>(20, device_available))

@@ -1,5 +1,5 @@
-"""What cpack makes of a build: a .deb and a .tar.gz (.tar.xz takes a minute more) that hold the program, the headers and the Python module, unpacked and
-run from there."""
+"""What cpack makes of a build: a .deb and an archive that hold the program, the headers and the Python module, unpacked
+and run from there. The archive is a .tar.gz here: to pack the same files as .tar.xz takes a minute of two cores."""
 import argparse
 import os
 import pathlib

@@ -9,7 +9,7 @@ import {onEach} from './screens.mjs';
 
 const samples = 2;
 // Cases that change the scene wait for each image, so theirs are traced by one sample.
-const once = {samples: 1, bounces: 1};
+const oneSample = {samples: 1, bounces: 1};
 const description = {
   models: [{file: 'among.ply'}],
   meshes: [{name: 'ball', shape: 'sphere', scale: 0.4}, {name: 'floor', shape: 'plane', translation: [0, 1, 0], scale: 2}],
@@ -31,7 +31,7 @@ async function end(server) {
 
 // A page whose list has the ball chosen; at(): where the stage shows a point.
 async function openBall(world, screen) {
-  const server = await serve(world, once);
+  const server = await serve(world, oneSample);
   const p = await openPage(world.browser, server.control, screen);
   await p.tab('scene');
   await p.page.click('#scene-list button:has-text("ball")');
@@ -172,7 +172,7 @@ const turned = onEach({
 
 const added = onEach({
   async 'a mesh that is dropped or chosen is in the scene, what is wrong is said'(world, screen) {
-    const server = await serve(world, once), {browser} = world;
+    const server = await serve(world, oneSample), {browser} = world;
     const p = await openPage(browser, server.control, screen);
     await p.tab('scene');
     const said = (part) => p.until(`"${part}"`, async () => (await p.page.textContent('#say')).includes(part));

@@ -80,15 +80,14 @@ void register_configurations(int rank, bool (*available)(std::string*) = always_
   register_configuration_of<E, scene_traits<3>, Tracer, Method, Comm>(rank, available);
 }
 
-/// For all SH degrees in rows of degree 3: where degree 0 alone is rare, rows of it are not worth their time to
-/// compile.
-template <execution E, class Tracer, gradient_method Method, class Comm = self_comm>
-void register_degree_3(int rank, bool (*available)(std::string*) = always_available) {
-  register_configuration_of<E, scene_traits<3>, Tracer, Method, Comm>(rank, available);
+/// The configuration with depth gradients: the primitive method, for all SH degrees in rows of degree 3.
+template <execution E, class Tracer>
+void register_depth(int rank, bool (*available)(std::string*) = always_available) {
+  register_configuration_of<E, scene_traits<3>, Tracer, with_depth<primitive_method>>(rank, available);
 }
 
 /// All methods, ranked from first_rank in the list's order. On hosts those with ordered sums are left to the
-/// variants. The method that is taken where none is named has rows of degree 0 too.
+/// variants. Only the primitive method, which is taken where none is named, is worth compiling for degree 0 too.
 template <execution E, class Tracer>
 void register_methods(int first_rank, bool (*available)(std::string*) = always_available) {
   int rank = first_rank;
@@ -96,7 +95,7 @@ void register_methods(int first_rank, bool (*available)(std::string*) = always_a
     if constexpr (std::is_same_v<Method, primitive_method>)
       register_configurations<E, Tracer, Method>(rank++, available);
     else if constexpr (E::device || !Method::ordered)
-      register_degree_3<E, Tracer, Method>(rank++, available);
+      register_configuration_of<E, scene_traits<3>, Tracer, Method>(rank++, available);
   });
 }
 
