@@ -204,6 +204,7 @@ TEST_CASE_TEMPLATE("exposures act on what the lens let through", E, GART_TEST_PO
   auto falloff = floats(state, "vignetting");
   for (int c = 0; c < 3; ++c) falloff[static_cast<std::size_t>(3 * c)] = -0.5f - 0.1f * c;
   state.parts.set("vignetting", falloff);
+  state.step = 4;  // exposures rest at first
   run.set_state(state);
   std::vector<float> shown;
   run.step([&](gart::loss_input<E> const& in) {

@@ -4,7 +4,10 @@
 /// of a lens. Each maps the rendered image before the loss. The gradient of a row is a sum over the pixels of an image.
 /// A step moves one row by Adam.
 ///
-/// Buffers: 3 Floats + 1 words a row, a few sums, and a copy of the image. Cost: two passes over the image and three
+/// Rows may be centred: their mean over the rows that have moved stays where they started. What all of them share
+/// is then left to the scene.
+///
+/// Buffers: 3 Floats + 1 words a row, a few sums, and a copy of the image. Cost: two passes over the image and four
 /// launches over a few numbers a step; no host read. The order of all sums depends on the image's size only. A number
 /// whose gradient is not finite keeps its value.
 
@@ -14,6 +17,7 @@
 #include <gart/math/arith.hpp>
 #include <gart/optim/adam.hpp>
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -26,13 +30,29 @@ struct row_adam_kernel {
   float* value;
   float* first;
   float* second;
+  float* change;
   adam_rule rule;
   float rate;
 
   GART_KERNEL void operator()(index_t k) const {
     auto const to = rule.moved<float>({value[k], first[k], second[k]}, gradient[k], rate);
+    change[k] = 0;
     if (!is_finite(to.second) || !is_finite(to.parameter)) return;
+    change[k] = to.parameter - value[k];
     value[k] = to.parameter, first[k] = to.first, second[k] = to.second;
+  }
+};
+
+// Takes a row's share of the last change from each number that has moved: those have a second moment.
+struct centring_kernel {
+  float* value;
+  float const* second;
+  float const* change;
+  index_t floats;
+  float share;
+
+  GART_KERNEL void operator()(index_t i) const {
+    if (second[i] > 0) value[i] = fma(-share, change[i % floats], value[i]);
   }
 };
 
@@ -72,8 +92,8 @@ struct map_gradient_kernel {
 
 }  // namespace detail
 
-/// Map (detail::exposure_map) has the type of a row and Adam's epsilon: gradients far below it hardly move a row
-/// (adam.hpp). For kernels it has how a row maps the colour of a pixel.
+/// Map (detail::exposure_map) has the type of a row, whether rows are centred, and Adam's epsilon: gradients far below
+/// it hardly move a row (adam.hpp). For kernels it has how a row maps the colour of a pixel.
 template <execution E, class Map>
 class adam_table {
   static constexpr int floats = Map::row::floats;
@@ -89,6 +109,7 @@ class adam_table {
         mapped_(exec),
         sums_(exec),
         gradient_(exec, floats),
+        change_(exec, floats),
         ends_(exec, std::vector<u32>(runs + 1)) {
     std::vector<u32> ends(runs + 1);
     for (u32 r = 0; r <= runs; ++r) ends[r] = r * runs;
@@ -103,10 +124,16 @@ class adam_table {
     adam_options const adam;
     adam_rule rule(adam, visit);
     rule.epsilon = Map::epsilon;
-    parallel_for(
-        *exec_, "row_adam", floats,
-        detail::row_adam_kernel{gradient_.data(), value_.data() + from, first_.data() + from, second_.data() + from,
-                                rule, static_cast<float>(rate * adam_rule::first_correction(adam, visit))});
+    parallel_for(*exec_, "row_adam", floats,
+                 detail::row_adam_kernel{gradient_.data(), value_.data() + from, first_.data() + from,
+                                         second_.data() + from, change_.data(), rule,
+                                         static_cast<float>(rate * adam_rule::first_correction(adam, visit))});
+    if constexpr (Map::centred) {
+      auto const moved = std::count_if(visits_.begin(), visits_.end(), [](u32 visits) { return visits > 0; });
+      parallel_for(*exec_, "row_centre", static_cast<index_t>(value_.size()),
+                   detail::centring_kernel{value_.data(), second_.data(), change_.data(), index_t{floats},
+                                           1.0f / static_cast<float>(moved)});
+    }
   }
 
   /// For a checkpoint: [rows][floats] each, and how many steps moved a row.
@@ -163,7 +190,7 @@ class adam_table {
   E* exec_;
   buffer<float, E> value_, first_, second_;
   std::vector<u32> visits_;
-  buffer<float, E> mapped_, sums_, gradient_;
+  buffer<float, E> mapped_, sums_, gradient_, change_;
   buffer<u32, E> ends_;
 };
 

@@ -4,7 +4,8 @@
 /// before the loss. Adam moves the twelve numbers of the step's view. With x' the exposed image,
 ///   dL/dx = M^T dL/dx',   dL/dM = sum over pixels of dL/dx' (x, 1)^T.
 ///
-/// The identity shows the scene's colours. Only the start at the identity keeps the views' mean exposure near it.
+/// The identity shows the scene's colours, and the mean exposure of the views stays at it (adam_table.hpp). Nothing
+/// else tells a bright scene from bright exposures, and a model is looked at without them.
 ///
 /// Adam's epsilon is 0.03, large beside the usual one. The loss is a mean over pixels. So a photograph a tenth too
 /// bright gives gradients of a few tenths at any size. Smaller gradients come mostly from Gaussians that have not
@@ -23,6 +24,7 @@ struct exposure_map {
   using row = exposure;
   static constexpr char const *label = "expose", *gradient_label = "exposure_gradient";
   static constexpr float epsilon = 0.03f;
+  static constexpr bool centred = true;
 
   GART_HD void apply(exposure const& e, index_t, float const* x, float* exposed) const {
     for (int c = 0; c < 3; ++c) exposed[c] = e.channel(c, x[0], x[1], x[2]);

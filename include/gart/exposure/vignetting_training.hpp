@@ -21,6 +21,7 @@ struct vignetting_map {
   using row = vignetting;
   static constexpr char const *label = "shade", *gradient_label = "vignetting_gradient";
   static constexpr float epsilon = adam_options::epsilon;
+  static constexpr bool centred = false;
   image_circle circle;
   index_t width;
 

@@ -24,9 +24,11 @@ struct learning_rates {
   /// sqrt(long_run / steps), at most by four. Their decay starts later, the shorter the run, at most at
   /// decay_start_short.
   int long_run = 15000;
-  float decay_start_short = 0.9f;                      ///< share of the shortest runs before the decay
-  float exposure = 0.05f;                              ///< a visit of the view; decays like the means'
-  static constexpr float exposure_final = 0.005f;      ///< where it ends
+  float decay_start_short = 0.9f;                  ///< share of the shortest runs before the decay
+  float exposure = 0.05f;                          ///< a visit of the view; decays like the means'
+  static constexpr float exposure_final = 0.005f;  ///< where it ends
+  /// Share of the run before exposures move. First Gaussians are faint, and exposures would make up for that.
+  static constexpr float exposure_rest = 0.07f;
   float vignetting = 1e-2f, vignetting_final = 1e-4f;  ///< a visit of the lens; likewise
 };
 

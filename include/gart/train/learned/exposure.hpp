@@ -26,7 +26,9 @@ class learned_exposures final : public learned_part<Frame> {
   void after_loss(step_view const& v, span<float> gradient, span<float> numbers) override {
     exec_->copy(numbers.data(), training_.differentiate(v.index, image_, gradient).data(), sizeof(exposure));
   }
-  void step(std::size_t view, int, span<float const> numbers, int, int, learning_rates const& rates) override {
+  void step(std::size_t view, int, span<float const> numbers, int step, int iterations,
+            learning_rates const& rates) override {
+    if (static_cast<float>(step) < rates.exposure_rest * static_cast<float>(iterations)) return;
     training_.move(view, numbers, rates.exposure);
   }
   void save(named_arrays& state) const override { training_.save(state, "exposure"); }
