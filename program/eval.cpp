@@ -167,8 +167,8 @@ void add_eval(CLI::App& app, command& selected) {
   add_open(*eval, "--out", a->out, "METRICS.json", "Where the scores go")->required();
   add_open(*eval, "--renders", a->renders, "DIR", "Also keep NAME.png and NAME_truth.png of each view here");
   add_open(*eval, "--pairs", a->pairs, "DIR",
-           "Also keep DIR/render/NAME.png and DIR/truth/NAME.png of each\nview, for LPIPS and what else compares "
-           "two folders");
+           "Also keep DIR/render/NAME.png and DIR/truth/NAME.png of each\nview, for LPIPS (bench/perceptual.py) and "
+           "what else compares\ntwo folders");
   add_exposures(*eval, a->exposures);
   add_value(*eval, "--background", a->background, "NAME", "white or black; auto: as gart train chooses")
       ->check(one_of({"auto", "white", "black"}));
