@@ -64,14 +64,16 @@ def main():
     try:
         with open(a.scores) as file:
             scores = json.load(file)
+        psnr, ssim, resize, _ = (scores[name] for name in ("psnr", "ssim", "resize_filter", "views"))
+    except KeyError as missing:
+        raise SystemExit(f"bench/perceptual.py: {a.scores}: has no {missing}; gart eval --out {a.scores} writes it")
     except (OSError, ValueError) as error:
         raise SystemExit(f"bench/perceptual.py: {a.scores}: {error}; gart eval --out {a.scores} writes it")
     names = pairs(a.pairs, scores)
     torch, image, lpips = packages()
     device = "cuda" if torch.cuda.is_available() else "cpu"
     result = {"what": "lpips", "commit": commit_of(a.commit), "machine": machine(), "date": now(),
-              "command": command_line(), "resize_filter": scores["resize_filter"], "psnr": scores["psnr"],
-              "ssim": scores["ssim"], "lpips": []}
+              "command": command_line(), "resize_filter": resize, "psnr": psnr, "ssim": ssim, "lpips": []}
     sizes = set()
     for net in a.nets.split(","):
         distance = lpips.LPIPS(net=net, verbose=False).to(device).eval()
@@ -87,8 +89,8 @@ def main():
         for of, each in views.items():
             mean = sum(each.values()) / len(each)
             result["lpips"].append({"net": net, "range": of, "mean": mean, "views": each})
-            print(f"LPIPS {mean:.4f} ({net}, images in {of}, {result['image_size']}, resize {scores['resize_filter']})")
-    print(f"PSNR {scores['psnr']:.2f} dB, SSIM {scores['ssim']:.4f} of the same images")
+            print(f"LPIPS {mean:.4f} ({net}, images in {of}, {result['image_size']}, resize {resize})")
+    print(f"PSNR {psnr:.2f} dB, SSIM {ssim:.4f} of the same images")
     write_json(a.out, result)
 
 

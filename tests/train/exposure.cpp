@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <vector>
 
 using namespace gart_test;
@@ -133,6 +134,22 @@ TEST_CASE_TEMPLATE("gains of photographs about their mean are found", E, GART_TE
     for (auto const& view : field.views()) sum += view.value.m[k];
     CHECK(std::abs(sum / 4 - identity.m[k]) < 1e-4f);
   }
+}
+
+TEST_CASE_TEMPLATE("exposures rest at first", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  E exec;
+  auto const data = capture(exec, seed);
+  run_of<E> run(exec, learning_exposures(110), data, cloud(seed + 1, 0.6f));
+  auto const visits = [&] {
+    auto const of = words(run.state(), "exposure/visits");
+    return std::accumulate(of.begin(), of.end(), 0u);
+  };
+  for (int i = 0; i < 8; ++i) run.step();
+  CHECK(visits() == 0);
+  run.step();
+  CHECK(visits() == 1);
 }
 
 TEST_CASE_TEMPLATE("a state carries exposures; other view counts are refused", E, GART_TEST_POLICIES) {
