@@ -244,7 +244,7 @@ void continue_run(train_arguments& a) {
   // Runs that recorded --set as text had other defaults, which they keep.
   if (options.contains("set") && options["set"].is_string()) {
     std::string text = options["set"];
-    for (std::string const before : {"rates.sh_rest=0.000125", "sh_penalty=0"})
+    for (std::string const before : {"rates.sh_rest=0.000125", "sh_penalty=0", "error.draw_by_root=0"})
       if (text.find(before.substr(0, before.find('=') + 1)) == std::string::npos)
         text += (text.empty() ? "" : ",") + before;
     options["set"] = text;

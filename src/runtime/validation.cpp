@@ -227,6 +227,8 @@ std::vector<candidate> default_candidates(capture_traits const& traits, train_op
   if (options.densify == densify_kind::error &&
       growth_budget(more, most, traits.pixels) > growth_budget(options.error, most, traits.pixels))
     all.push_back({"error.pixels_per_gaussian", "100", [](train_options& o) { o.error.pixels_per_gaussian = 100; }});
+  if (options.densify == densify_kind::error)
+    all.push_back({"error.draw_by_root", "0", [](train_options& o) { o.error.draw_by_root = false; }});
   // Poses, lenses and depth take steps too, and trials have none of them.
   if (options.refine_poses || options.refine_lens || options.depth_weight > 0) return all;
   int const third = options.iterations / validation_plan::long_trial;

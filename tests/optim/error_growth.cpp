@@ -23,8 +23,10 @@ error_growth_options usual() {
 template <class E>
 struct training : gart_test::with_moments<E> {
   using gart_test::with_moments<E>::with_moments;
-  error_growth<E> densifier(index_t most, std::vector<float> const& error, u64 seed = 1) {
-    error_growth<E> out(this->exec, usual(), most, 2000, seed);
+  error_growth<E> densifier(index_t most, std::vector<float> const& error, u64 seed = 1, bool by_root = false) {
+    error_growth_options options = usual();
+    options.draw_by_root = by_root;
+    error_growth<E> out(this->exec, options, most, 2000, seed);
     out.error_sum.assign(error);
     return out;
   }
@@ -145,12 +147,15 @@ TEST_CASE_TEMPLATE("dead Gaussians give rows to children by the error seen", E, 
   CHECK(densifier.error_sum.size() == most);
 }
 
-TEST_CASE_TEMPLATE("sources are drawn by error seen through them and opacity", E, GART_TEST_POLICIES) {
+// Whether rows are drawn in proportion to opacity times error, or times its root.
+template <class E>
+void check_draws(bool by_root) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   index_t const n = 40000, drawn = 800;
   int const kinds = 8;
-  auto const error_of = [](index_t kind) { return 1.0 + kind % 4; };
+  auto const error_of = [](index_t kind) { return 1.0 + 3 * (kind % 4); };
+  auto const weight_of = [&](index_t kind) { return by_root ? std::sqrt(error_of(kind)) : error_of(kind); };
   auto const opacity_of = [](index_t kind) { return kind < 4 ? 0.2 : 0.8; };
   gaussian_model start = tagged(n, random);
   std::vector<float> error(n);
@@ -159,18 +164,21 @@ TEST_CASE_TEMPLATE("sources are drawn by error seen through them and opacity", E
     start.opacity[i] = static_cast<float>(logit(opacity_of(i % kinds)));
   }
   training<E> t(start);
-  auto densifier = t.densifier(n + drawn, error, gart_test::seed());
+  auto densifier = t.densifier(n + drawn, error, gart_test::seed(), by_root);
   REQUIRE(densifier.densify(t, {1500}).added == drawn);
   gaussian_model const got = t.model.to_host();
   double count[kinds] = {}, chi_square = 0, all = 0;
   for (index_t i = n; i < n + drawn; ++i) ++count[tag_of(got, i) % kinds];
-  for (index_t k = 0; k < kinds; ++k) all += error_of(k) * opacity_of(k);
+  for (index_t k = 0; k < kinds; ++k) all += weight_of(k) * opacity_of(k);
   for (index_t k = 0; k < kinds; ++k) {
-    double const expected = drawn * error_of(k) * opacity_of(k) / all, d = count[k] - expected;
+    double const expected = drawn * weight_of(k) * opacity_of(k) / all, d = count[k] - expected;
     chi_square += d * d / expected;
   }
   CHECK(chi_square < 33);  // of seven degrees of freedom: one run in 40,000
 }
+
+TEST_CASE_TEMPLATE("sources are drawn by error and opacity", E, GART_TEST_POLICIES) { check_draws<E>(false); }
+TEST_CASE_TEMPLATE("sources are drawn by the root of the error", E, GART_TEST_POLICIES) { check_draws<E>(true); }
 
 TEST_CASE_TEMPLATE("the count follows its curve and at most doubles", E, GART_TEST_POLICIES) {
   std::mt19937_64 random(gart_test::seed());

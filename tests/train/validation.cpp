@@ -199,8 +199,10 @@ TEST_CASE("what changes nothing of a run is no candidate") {
   traits.panoramas = 1, traits.pixels = 100'000'000;
   CHECK(!has("vignetting"));
   CHECK(has("error.pixels_per_gaussian"));
+  CHECK(has("error.draw_by_root"));
   of.densify = gart::densify_kind::mcmc;
   CHECK(!has("error.pixels_per_gaussian"));
+  CHECK(!has("error.draw_by_root"));
   CHECK(gart::default_candidates(traits, of).back().shortens);
   for (auto const& c : gart::default_candidates({}, {})) c.take(of);
   CHECK(of.iterations == 10000);

@@ -74,6 +74,7 @@ struct error_growth_options {
   /// and memory. 0: at max_gaussians, whatever the capture.
   float pixels_per_gaussian = 200;
   int min_gaussians = 100'000;  ///< that pixels_per_gaussian leaves to the smallest capture
+  bool draw_by_root = true;     ///< draws by the root of the error; false: by the error
 };
 
 /// Of adaptive density control (train/densify/adc.hpp).

@@ -127,6 +127,7 @@ inline constexpr option_field option_fields[] = {
     {GART_FIELD(error.split.opacity), 1e-6, 1, "Rules", "factor of opacity at a split"},
     {GART_FIELD(error.pixels_per_gaussian), 0, 1e9, "Rules", "training pixels to a Gaussian at least; 0: any"},
     {GART_FIELD(error.min_gaussians), 0, 2147483647.0, "Rules", "Gaussians that the smallest capture may have"},
+    {GART_FIELD(error.draw_by_root), 0, 1, "Rules", "1: splits are drawn by the root of the error, 0: by the error"},
     {GART_FIELD(mcmc.growth), 0, 10, "Rules", "growth a densification of mcmc"},
     {GART_FIELD(mcmc.noise), 0, 1e12, "Rules", "random steps of mcmc, times the rate of means"},
     {GART_FIELD(mcmc.opacity_penalty), 0, 1e6, "Rules", "weight of the mean opacity in the loss"},

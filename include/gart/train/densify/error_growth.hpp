@@ -8,13 +8,15 @@
 /// share is multiplied by the opacity. Haze shows much error that other Gaussians cause, and splitting haze overfits
 /// single views.
 ///
-/// A densification draws Gaussians without replacement, in proportion to share times opacity. The least values of
-/// -ln(u) / weight, u uniform, are drawn (Efraimidis and Spirakis 2006). Each is split along its long axis
-/// (long_axis_split.hpp). One is drawn for each dead Gaussian, whose row the second child takes. So is one for each
-/// that the count grows by. The count follows a square-root curve to the budget at the share `growth_end` of the run.
-/// It at most doubles at a time. Few pixels in the capture lower the budget (growth_budget). Gaussians of a pixel or
-/// two learn the noise and pose errors of photographs. First children keep Adam's moments, second ones start with none.
-/// After `growth_end` only the dead are replaced, after `until` nothing moves.
+/// A densification draws Gaussians without replacement, in proportion to opacity times the square root of the share.
+/// Photographs that disagree leave an error that no split takes away, and the root gives it fewer splits. Where they
+/// agree the share itself may be better (draw_by_root). The least values of -ln(u) / weight, u uniform, are drawn
+/// (Efraimidis and Spirakis 2006). Each is split along its long axis (long_axis_split.hpp). One is drawn for each dead
+/// Gaussian, whose row the second child takes. So is one for each that the count grows by. The count follows a
+/// square-root curve to the budget at the share `growth_end` of the run. It at most doubles at a time. Few pixels in
+/// the capture lower the budget (growth_budget). Gaussians of a pixel or two learn the noise and pose errors of
+/// photographs. First children keep Adam's moments, second ones start with none. After `growth_end` only the dead are
+/// replaced, after `until` nothing moves.
 ///
 /// A small penalty on the mean opacity fades Gaussians that no view needs, until they are dead. A Gaussian whose
 /// opacity or geometry is not finite counts as dead. Where no error is attributed, or none is alive, nothing is moved.
@@ -59,6 +61,7 @@ struct error_key_kernel {
   float const* sum;
   float dead_opacity;
   float const* filter;  // or null
+  bool by_root;
   random_source random;
   u32* dead;
   u32* drawable;
@@ -66,7 +69,7 @@ struct error_key_kernel {
   u32* id;
   GART_KERNEL void operator()(index_t i) const {
     bool const lives = is_alive(model, i, dead_opacity, filter);
-    float const weight = sum[i] * sigmoid(model.opacity[i]);
+    float const weight = (by_root ? sqrtf(sum[i]) : sum[i]) * sigmoid(model.opacity[i]);
     bool const fits = lives && weight > 0 && is_finite(weight);
     float const u = (static_cast<float>(random.words(owners.global(i)).v[0] >> 8) + 0.5f) * 0x1p-24f;
     dead[i] = !lives, drawable[i] = fits;
@@ -192,6 +195,7 @@ class error_growth final : public densifier<E> {
                                           errors,
                                           options_.dead_opacity,
                                           now.filter.data(),
+                                          options_.draw_by_root,
                                           {seed_, static_cast<u32>(now.step), random_use::growth},
                                           dead_.data(),
                                           drawable_.data(),
