@@ -5,10 +5,14 @@
 ///   x_d = x (1 + k1 r2 + k2 r2^2) + 2 p1 x y + p2 (r2 + 2 x x),  y_d likewise with p1 and p2 exchanged;
 /// a ray inverts it by Newton's method (camera/undistort.hpp).
 ///
-/// A box is that of any curve of the angle with the axis (camera/lens_bounds.hpp). A Gaussian may be seen large, or
-/// cross the near plane. Then the rectangle of slopes is mapped to the image edge by edge. The map is one to one where
-/// the image is. So the image of the rectangle lies within the image of its border. The border is sampled, and widened
-/// by the bulge of a curved edge between samples.
+/// The box of a Gaussian that is seen small is that of the map's tangent in the middle of its slopes. The tangent's
+/// extremes on the silhouette are exact, as those of a pinhole. The map's curvature widens them by K |h|^2 / 2 at most,
+/// with h the half-extents in slopes and K the largest second derivative there.
+///
+/// Where that is more than a tenth of a pixel, the box is that of any curve of the angle with the axis
+/// (camera/lens_bounds.hpp). It is cut by the rectangle of slopes, mapped to the image edge by edge. The map is one to
+/// one where the image is. So the image of the rectangle lies within the image of its border. The border is sampled,
+/// and widened by the bulge of a curved edge between samples.
 
 #include <gart/camera/lens_bounds.hpp>
 #include <gart/camera/pinhole.hpp>
@@ -31,17 +35,19 @@ class opencv_bounds {
     double const mu = margin * (seen.x1 - seen.x0), mw = margin * (seen.y1 - seen.y0);
     u_ = {seen.x0 - mu, seen.x1 + mu}, w_ = {seen.y0 - mw, seen.y1 + mw};
     view_ = c.view_of(near * seen.least_cosine * (1 - margin));
+    near_ = near;
   }
 
   /// The pixels that can hit it, and its near depth; empty where none can.
   GART_HD footprint operator()(ellipsoid const& e) const { return box_of(e, curved_); }
-  /// As lens_bounds::narrow.
+  /// The same of those that are seen small; else nothing, and `wide` is set.
   GART_HD footprint narrow(ellipsoid const& e, bool& wide) const {
-    return box_of(e, [&](ellipsoid const& same) { return curved_.narrow(same, wide); });
+    return box_of(e, [&](ellipsoid const&) { return wide = true, footprint{}; });
   }
 
  private:
-  static constexpr u32 small = 32;  // sides of an image are so many times those of such a box
+  static constexpr u32 small = 32;           // sides of an image are so many times those of such a box
+  static constexpr double most_bulge = 0.1;  // pixels that curvature may add to the tangent's box
 
   template <class Curved>
   GART_HD footprint box_of(ellipsoid const& e, Curved const& curved_box) const {
@@ -50,6 +56,11 @@ class opencv_bounds {
     if (!s.visible || s.u.hi + s.error < u_.lo || s.u.lo - s.error > u_.hi || s.w.hi + s.error < w_.lo ||
         s.w.lo - s.error > w_.hi)
       return {};
+    if (tangent_box(e, s, out.box)) {
+      float const distance = least_distance(e, near_);
+      out.depth = distance > out.depth ? distance : out.depth;
+      return out.box.empty() ? footprint{} : out;
+    }
     footprint const curved = curved_box(e);
     if (curved.box.empty()) return {};
     out.depth = curved.depth > out.depth ? curved.depth : out.depth;  // a distance, which z is at most
@@ -63,6 +74,36 @@ class opencv_bounds {
                a.y1 < b.y1 ? a.y1 : b.y1};
     if (out.box.empty()) return {};
     return out;
+  }
+
+  // False where curvature adds too much.
+  GART_HD bool tangent_box(ellipsoid const& e, slope_box const& s, pixel_box& box) const {
+    double const x = 0.5 * (s.u.lo + s.u.hi), y = 0.5 * (s.w.lo + s.w.hi);
+    double const hx = 0.5 * (s.u.hi - s.u.lo) + s.error, hy = 0.5 * (s.w.hi - s.w.lo) + s.error;
+    double const bulge = 0.5 * curvature(fabs(x) + hx, fabs(y) + hy) * (hx * hx + hy * hy);
+    if (!(bulge * (view_.fx > view_.fy ? view_.fx : view_.fy) < most_bulge)) return false;
+    camera_ellipsoid const seen(view_, e);
+    auto const at = lens_curve(camera_kind::perspective, lens_).image_of(x, y);
+    // Bounds of value + gx (X/Z - x) + gy (Y/Z - y).
+    auto const along = [&](double value, double gx, double gy) {
+      detail::interval const t = detail::slope_bounds(gx * seen.m.x + gy * seen.m.y, gx * seen.ax + gy * seen.ay,
+                                                      seen.m.z, seen.az, view_.near);
+      double const base = value - gx * x - gy * y;
+      return detail::interval{base + t.lo - bulge, base + t.hi + bulge};
+    };
+    slope_box image = s;
+    image.u = along(at.x, at.xx, at.xy), image.w = along(at.y, at.yx, at.yy);
+    double const to_u = fabs(at.xx) + fabs(at.xy), to_w = fabs(at.yx) + fabs(at.yy);
+    image.error *= to_u > to_w ? to_u : to_w;
+    box = pixels_of(view_, image);
+    return true;
+  }
+
+  // Second derivatives of the lens are at most this where |x| <= rx and |y| <= ry.
+  GART_HD double curvature(double rx, double ry) const {
+    double const r = sqrt(rx * rx + ry * ry);
+    return 6 * (fabs(double{lens_.k1}) * r + fabs(double{lens_.p1}) + fabs(double{lens_.p2})) +
+           20 * fabs(double{lens_.k2}) * r * r * r;
   }
 
   GART_HD slope_box distorted(slope_box const& s) const {
@@ -81,14 +122,10 @@ class opencv_bounds {
         u.add(a), v.add(c);
       }
     }
-    // Second derivatives of the lens along an edge are at most this on the rectangle. A chord of length h bulges h^2 /
-    // 8 times as much.
+    // A chord of length h bulges h^2 / 8 times the curvature.
     double const rx = fabs(x0) > fabs(x1) ? fabs(x0) : fabs(x1), ry = fabs(y0) > fabs(y1) ? fabs(y0) : fabs(y1);
-    double const r = sqrt(rx * rx + ry * ry);
-    double const curvature = 6 * (fabs(double{lens_.k1}) * r + fabs(double{lens_.p1}) + fabs(double{lens_.p2})) +
-                             20 * fabs(double{lens_.k2}) * r * r * r;
     double const hx = (x1 - x0) / steps, hy = (y1 - y0) / steps;
-    double const bulge = curvature * (hx * hx + hy * hy) / 8;
+    double const bulge = curvature(rx, ry) * (hx * hx + hy * hy) / 8;
     slope_box out = s;
     out.u = {u.lo - bulge, u.hi + bulge}, out.w = {v.lo - bulge, v.hi + bulge};
     return out;
@@ -98,6 +135,7 @@ class opencv_bounds {
   lens_bounds curved_;
   detail::interval u_, w_;  // slopes the image sees
   footprint_view view_;
+  float near_;
 };
 
 /// What antialiasing asks of the lens.

@@ -163,13 +163,22 @@ struct slope_box {
   bool visible = false;   ///< whether any of it can be hit
 };
 
+/// An ellipsoid in the camera's axes.
+struct camera_ellipsoid {
+  vec3d m;           ///< centre
+  vec3d ax, ay, az;  ///< rows of A
+  GART_HD camera_ellipsoid(footprint_view const& v, ellipsoid const& e) : m(v.to_camera * e.center) {
+    mat3d const a = v.to_camera * e.axes;
+    ax = vec3d(a[0][0], a[1][0], a[2][0]), ay = vec3d(a[0][1], a[1][1], a[2][1]), az = vec3d(a[0][2], a[1][2], a[2][2]);
+  }
+};
+
 /// Sets the footprint's depth only.
 GART_HD inline footprint project(footprint_view const& v, ellipsoid const& e, slope_box& s) {
   footprint out;
   vec3d const& center = e.center;
-  vec3d const m = v.to_camera * center;
-  mat3d const a = v.to_camera * e.axes;
-  vec3d const ax(a[0][0], a[1][0], a[2][0]), ay(a[0][1], a[1][1], a[2][1]), az(a[0][2], a[1][2], a[2][2]);
+  camera_ellipsoid const seen(v, e);
+  vec3d const &m = seen.m, &ax = seen.ax, &ay = seen.ay, &az = seen.az;
   double const depth = sqrt(az.x * az.x + az.y * az.y + az.z * az.z);
   double const reach = fabs(center.x) + fabs(center.y) + fabs(center.z) + depth +
                        sqrt(ax.x * ax.x + ax.y * ax.y + ax.z * ax.z) + sqrt(ay.x * ay.x + ay.y * ay.y + ay.z * ay.z);

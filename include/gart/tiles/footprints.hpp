@@ -61,7 +61,7 @@ struct measure {
 template <execution E, class Response, int Size, class Bounds>
 struct measure_left : measure<E, Response, Size, Bounds> {
   static constexpr int block_size = 32, min_blocks = 1;
-  static constexpr index_t lanes = 8192;  // whatever the count, which the host does not know
+  static constexpr index_t lanes = 32768;  // whatever the count, which the host does not know; a GPU's at once
   GART_KERNEL void operator()(index_t lane) const {
     for (u64 k = lane; k < *this->left_count; k += lanes) {
       index_t const i = static_cast<index_t>(this->left[k]);
