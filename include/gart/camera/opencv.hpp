@@ -42,7 +42,10 @@ class opencv_bounds {
   GART_HD footprint operator()(ellipsoid const& e) const { return box_of(e, curved_); }
   /// The same of those that are seen small; else nothing, and `wide` is set.
   GART_HD footprint narrow(ellipsoid const& e, bool& wide) const {
-    return box_of(e, [&](ellipsoid const&) { return wide = true, footprint{}; });
+    return box_of(e, [&](ellipsoid const&) {
+      wide = true;
+      return footprint{};
+    });
   }
 
  private:
