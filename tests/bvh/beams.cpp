@@ -50,7 +50,7 @@ TEST_CASE_TEMPLATE("beams of every direction and width", E, GART_TEST_POLICIES) 
       rays.insert(rays.end(), some.begin(), some.end());
     }
     rays.resize(rays.size() - 7);
-    check_rays(exec, model, rays, 0.01f, 0);
+    check_rays(exec, model, rays, 0.01f, 0, windows::with_tree);
   }
 }
 
@@ -73,7 +73,7 @@ TEST_CASE_TEMPLATE("thousands of hits a ray of a beam", E, GART_TEST_POLICIES) {
   }
   auto rays = rays_about(random, vec3(0.0f), vec3(0, 0, 1), 1e-3f, 31);
   rays.push_back({vec3(0.0f), vec3(0, 0, 1)});
-  check_rays(exec, model, rays, 0.01f, 1);
+  check_rays(exec, model, rays, 0.01f, 1, windows::with_tree);
 }
 
 // All boxes hold the beam's origin: nodes come at one distance, more than there is room for.
@@ -82,7 +82,8 @@ TEST_CASE_TEMPLATE("rays that begin inside of all Gaussians", E, GART_TEST_POLIC
   std::mt19937_64 random(gart_test::seed() + 2);
   E exec;
   auto const model = cloud_of(random, 8000, 1.0f, 2.0f, 2);
-  check_rays(exec, model, rays_about(random, vec3(0.0f), vec3(1, 2, -1), 0.01f, 32, 0.01f), 0.01f, 100);
+  check_rays(exec, model, rays_about(random, vec3(0.0f), vec3(1, 2, -1), 0.01f, 32, 0.01f), 0.01f, 100,
+             windows::with_tree);
 }
 
 #if !defined(GART_TEST_CUDA)  // of a host's tree
