@@ -99,7 +99,8 @@ TEST_CASE_TEMPLATE("gradients of 16 and 128 features are their differences", E, 
     for (gradient_form const form : {gradient_form::scatter, gradient_form::primitive}) {
       CAPTURE(static_cast<int>(form));
       auto context = tracer.forward(traced.rays.rays(), sweep_options(), {}, form);
-      compare(model, s, sweep_options(), traced.differentiate(tracer, context, scene.scene.size(), 1, width));
+      compare("features " + std::to_string(width), model, s, sweep_options(),
+              traced.differentiate(tracer, context, scene.scene.size(), 1, width));
     }
   }
 }

@@ -297,6 +297,7 @@ TEST_CASE_TEMPLATE("gradients of actors are differences of models, keys and rays
   for (std::size_t i = 0; i < s.count(); ++i) total += dot(s.weights(i), shown, i);
   CHECK(total == doctest::Approx(loss().loss).epsilon(1e-3));
 
+  kept_slopes kept("actors");
   std::size_t used = 0, tried = 0;
   auto const check = [&](std::vector<double>& values, std::vector<float> const& by, char const* what, double bound) {
     CAPTURE(what);
@@ -305,7 +306,7 @@ TEST_CASE_TEMPLATE("gradients of actors are differences of models, keys and rays
     for (std::size_t i = 0; i < values.size(); i += step) {
       double expected = 0;
       ++tried;
-      if (!slope(values[i], loss, expected)) continue;
+      if (!kept.slope(values[i], loss, expected)) continue;
       ++used;
       c.add(double{by[i]}, expected);
     }
@@ -329,8 +330,8 @@ TEST_CASE_TEMPLATE("gradients of actors are differences of models, keys and rays
     auto const alone = [&] { return of_ray(i, r); };
     for (std::size_t k = 0; k < 3; ++k) {
       double expected = 0;
-      if (slope(r.origin[k], alone, expected)) origin.add(double{origins[3 * i + k]}, expected);
-      if (slope(r.direction[k], alone, expected)) direction.add(double{directions[3 * i + k]}, expected);
+      if (kept.slope(r.origin[k], alone, expected)) origin.add(double{origins[3 * i + k]}, expected);
+      if (kept.slope(r.direction[k], alone, expected)) direction.add(double{directions[3 * i + k]}, expected);
     }
   }
   CHECK(origin.relative() < 2e-4);

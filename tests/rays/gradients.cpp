@@ -23,7 +23,8 @@ TEST_CASE_TEMPLATE("gradients of a lidar sweep are its differences", E, GART_TES
     for (gradient_form const form : {gradient_form::scatter, gradient_form::primitive}) {
       CAPTURE(static_cast<int>(form));
       auto context = tracer.forward(traced.rays.rays(), sweep_options(), {}, form);
-      compare(model, s, sweep_options(), traced.differentiate(tracer, context, scene.size(), degree));
+      compare("a sweep of degree " + std::to_string(degree), model, s, sweep_options(),
+              traced.differentiate(tracer, context, scene.size(), degree));
     }
   }
 }

@@ -150,6 +150,7 @@ TEST_CASE_TEMPLATE("gradients of instances are differences of models and poses",
   }
   CHECK(total == doctest::Approx(loss().loss).epsilon(1e-3));
 
+  kept_slopes kept("instances");
   std::size_t used = 0, tried = 0;
   auto const check = [&](std::vector<double>& values, std::vector<float> const& by, char const* what) {
     CAPTURE(what);
@@ -158,7 +159,7 @@ TEST_CASE_TEMPLATE("gradients of instances are differences of models and poses",
     for (std::size_t i = 0; i < values.size(); i += step) {
       double expected = 0;
       ++tried;
-      if (!slope(values[i], loss, expected)) continue;
+      if (!kept.slope(values[i], loss, expected)) continue;
       ++used;
       c.add(double{by[i]}, expected);
     }
@@ -179,7 +180,7 @@ TEST_CASE_TEMPLATE("gradients of instances are differences of models and poses",
     for (std::size_t k = 0; k < 6; ++k) {
       double expected = 0;
       ++tried;
-      if (!slope(moved[n][k], loss, expected)) continue;
+      if (!kept.slope(moved[n][k], loss, expected)) continue;
       ++used;
       (k < 3 ? positions : turns).add(double{poses[6 * n + k]}, expected);
     }

@@ -5,6 +5,9 @@
 #include <rays/view_rays.hpp>
 
 #include <cmath>
+#include <map>
+#include <string>
+#include <vector>
 
 namespace gart_test {
 
@@ -110,6 +113,36 @@ bool slope(double& x, F const& loss, double& out) {
   return smooth;
 }
 
+// Slopes take nearly all of a test's time, and neither a policy nor the form of its gradients changes them: they are
+// found once for the inputs that have a name, and then handed out again in the same order.
+class kept_slopes {
+ public:
+  explicit kept_slopes(std::string const& inputs) {
+    static std::map<std::string, std::vector<entry>> known;
+    entries_ = &known[inputs];
+  }
+  template <class F>
+  bool slope(double& x, F const& loss, double& out) {
+    if (next_ == entries_->size()) {
+      entry found{x, 0, false};
+      found.smooth = gart_test::slope(x, loss, found.slope);
+      entries_->push_back(found);
+    }
+    entry const& e = (*entries_)[next_++];
+    REQUIRE(e.at == x);
+    out = e.slope;
+    return e.smooth;
+  }
+
+ private:
+  struct entry {
+    double at, slope;
+    bool smooth;
+  };
+  std::vector<entry>* entries_;
+  std::size_t next_ = 0;
+};
+
 // All rays of a sweep, each seen by f(i).
 template <class F>
 seen see_all(sweep const& s, F const& f) {
@@ -121,8 +154,10 @@ seen see_all(sweep const& s, F const& f) {
   return all;
 }
 
-inline void compare(gart::gaussian_model const& model, sweep const& s, gart::render_options const& options,
-                    results const& got) {
+// `inputs` names the other arguments but the last.
+inline void compare(std::string const& inputs, gart::gaussian_model const& model, sweep const& s,
+                    gart::render_options const& options, results const& got) {
+  kept_slopes kept(inputs);
   double_model m(model);
   auto const loss = [&] { return see_all(s, [&](std::size_t i) { return see(m, s.ray(i), s.weights(i), options); }); };
   std::size_t used = 0, tried = 0;
@@ -133,7 +168,7 @@ inline void compare(gart::gaussian_model const& model, sweep const& s, gart::ren
     for (std::size_t i = 0; i < values.size(); i += step) {
       double expected = 0;
       ++tried;
-      if (!slope(values[i], loss, expected)) continue;
+      if (!kept.slope(values[i], loss, expected)) continue;
       ++used;
       c.add(double{by[i]}, expected);
     }
@@ -153,8 +188,8 @@ inline void compare(gart::gaussian_model const& model, sweep const& s, gart::ren
     auto const of_ray = [&] { return see(m, r, s.weights(i), options); };
     for (std::size_t k = 0; k < 3; ++k) {
       double expected = 0;
-      if (slope(r.origin[k], of_ray, expected)) origin.add(double{got.origins[3 * i + k]}, expected);
-      if (slope(r.direction[k], of_ray, expected)) direction.add(double{got.directions[3 * i + k]}, expected);
+      if (kept.slope(r.origin[k], of_ray, expected)) origin.add(double{got.origins[3 * i + k]}, expected);
+      if (kept.slope(r.direction[k], of_ray, expected)) direction.add(double{got.directions[3 * i + k]}, expected);
     }
   }
   CHECK(origin.relative() < 1e-4);
