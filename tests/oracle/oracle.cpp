@@ -158,9 +158,12 @@ struct prepared {
   Vector3d from_mean;  // o - mean
   Matrix3d to_unit;    // S^-1 R^T
   double sigma;
+  Vector3d from_middle;  // to_unit from_mean
+  double far;            // farther from the mean, in squares of units, a response is less than half of what counts
 };
 
-std::vector<prepared> prepare(parameters const& m, Vector3d const& origin, pixels_filter const& filter) {
+std::vector<prepared> prepare(parameters const& m, Vector3d const& origin, pixels_filter const& filter,
+                              double alpha_min) {
   using std::sqrt;
   std::vector<prepared> out(m.size());
   for (std::size_t i = 0; i < m.size(); ++i) {
@@ -171,6 +174,8 @@ std::vector<prepared> prepare(parameters const& m, Vector3d const& origin, pixel
     out[i].sigma = 1 / (1 + std::exp(-m.opacity[i]));
     filter.widen<double>(-out[i].from_mean, r, scale, out[i].sigma);
     out[i].to_unit = scale.cwiseInverse().asDiagonal() * r.transpose();
+    out[i].from_middle = out[i].to_unit * out[i].from_mean;
+    out[i].far = 9.001 * std::pow(std::log(2 * out[i].sigma / alpha_min) / 4.5, 2.0 / m.kernel_degree);
   }
   return out;
 }
@@ -187,9 +192,10 @@ std::vector<hit> hits_of(std::vector<prepared> const& gaussians, int kernel_degr
   double const n = kernel_degree;
   for (std::size_t i = 0; i < gaussians.size(); ++i) {
     prepared const& g = gaussians[i];
-    Vector3d const o_g = g.to_unit * g.from_mean, d_g = g.to_unit * d;
+    Vector3d const &o_g = g.from_middle, d_g = g.to_unit * d;
     double const t = -o_g.dot(d_g) / d_g.squaredNorm();
     Vector3d const p = o_g + t * d_g;
+    if (p.squaredNorm() > g.far) continue;  // most are, and their powers would take most of the time
     double const radius = p.norm();
     double const response = g.sigma * std::exp(-4.5 * std::pow(radius / 3, n));
     if (response < 0.5 * alpha_min) continue;
@@ -422,7 +428,7 @@ picture render(parameters const& m, gart::camera const& c, gart::render_options 
   Matrix3d turn = Matrix3d::Identity();
   if (w.norm() > 0) turn = Eigen::AngleAxisd(w.norm(), w.normalized()).toRotationMatrix();
   Vector3d const origin = origin_of(c) + Vector3d(by.shift[0], by.shift[1], by.shift[2]);
-  auto const gaussians = prepare(m, origin, pixels_filter(c, options.antialias, turn));
+  auto const gaussians = prepare(m, origin, pixels_filter(c, options.antialias, turn), options.alpha_min);
   picture out{c.width, c.height, std::vector<pixel>(std::size_t(c.width) * c.height)};
   for (int j = 0; j < c.height; ++j)
     for (int i = 0; i < c.width; ++i) {
@@ -453,7 +459,7 @@ parameters gradients(parameters const& m, gart::camera const& c, gart::render_op
 
   Vector3d const origin = origin_of(c);
   pixels_filter const filter(c, options.antialias);
-  auto const gaussians = prepare(m, origin, filter);
+  auto const gaussians = prepare(m, origin, filter, options.alpha_min);
   for (std::size_t at = 0; at < pixels; ++at) {
     Vector3d const by_color(color_gradient[3 * at], color_gradient[3 * at + 1], color_gradient[3 * at + 2]);
     double const by_transmittance = transmittance_gradient.empty() ? 0.0 : transmittance_gradient[at];
