@@ -11,12 +11,15 @@
 
 namespace {
 
-constexpr int width = 32, height = 26, views = 48;
+constexpr int views = 48;
 gart::configuration_request const serial{gart::backend_kind::serial, gart::tracer_kind::automatic, "auto", 1};
 
 // Noisy photographs of a cloud, from all around it. `exposed`: each third of the way round at another exposure;
-// `lit`: the cloud is bright on one side and dark on the other, and the walls behind it with it.
-gart::dataset capture(std::uint64_t seed, bool exposed, bool lit) {
+// `lit`: the cloud is bright on one side and dark on the other, and the walls behind it with it. `small`: of a quarter
+// of the pixels, for what does not depend on how good a training is.
+enum class sized { whole, small };
+gart::dataset capture(std::uint64_t seed, bool exposed, bool lit, sized of = sized::whole) {
+  int const width = of == sized::small ? 16 : 32, height = of == sized::small ? 13 : 26;
   std::mt19937_64 engine(seed);
   std::normal_distribution<float> normal;
   gart::gaussian_model truth;
@@ -45,7 +48,8 @@ gart::dataset capture(std::uint64_t seed, bool exposed, bool lit) {
     gart::dataset_view view;
     view.name = std::to_string(v);
     view.view.width = width, view.view.height = height;
-    view.view.fx = view.view.fy = 35, view.view.cx = 16, view.view.cy = 13;
+    view.view.cx = 0.5f * static_cast<float>(width), view.view.cy = 0.5f * static_cast<float>(height);
+    view.view.fx = view.view.fy = 35.0f / 16 * view.view.cx;
     float const angle = 6.2831853f * static_cast<float>(v) / views, c = std::cos(angle), s = std::sin(angle);
     view.view.rotation = gart::mat3(gart::vec3(c, 0, -s), gart::vec3(0, 1, 0), gart::vec3(s, 0, c));
     view.view.position = gart::vec3d(-4.0 * s, 0, -4.0 * c);
@@ -95,7 +99,7 @@ TEST_CASE("differing exposures are found, uneven light is not") {
 TEST_CASE("held-out training views decide, test views do not") {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
-  auto const data = capture(seed, false, false);
+  auto const data = capture(seed, false, false, sized::small);
   auto const plan = gart::plan_validation(options(), data, some(1));
   CHECK(plan.held_out == std::vector<std::size_t>{2, 6, 10, 14, 18, 22, 26, 30, 34, 38, 42, 46});
   CHECK(plan.trials == 2);
@@ -105,13 +109,13 @@ TEST_CASE("held-out training views decide, test views do not") {
   auto const first = psnr(data);
   auto tested = data;
   tested.test = {data.train[3], data.train[4]};
-  CHECK(psnr(tested)[1].psnr == first[1].psnr);
+  auto const other_tests = psnr(tested);
+  CHECK(other_tests[0].psnr == first[0].psnr);
+  CHECK(other_tests[1].psnr == first[1].psnr);
   auto other = data;
   for (auto& v : other.train[6].image.data) v = 255 - v;
   auto const changed = psnr(other);
   CHECK(changed[0].psnr < first[0].psnr - 0.5);
-  other.train[6] = data.train[6];
-  CHECK(psnr(other)[0].psnr == first[0].psnr);
   // What a trial cannot have of a run is left out of it.
   auto rich = options();
   rich.batch = 4, rich.depth_weight = 1, rich.refine_poses = rich.refine_lens = true;
@@ -213,7 +217,7 @@ TEST_CASE("what changes nothing of a run is no candidate") {
 }
 
 TEST_CASE("trials that are ended count for nothing") {
-  auto const data = capture(gart_test::seed(), true, false);
+  auto const data = capture(gart_test::seed(), true, false, sized::small);
   int left = 900;  // the first trial and some of the next
   auto const ended =
       gart::validate(serial, options(), data, exposures(), [&](double, auto const&) { return --left > 0; });
