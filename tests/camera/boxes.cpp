@@ -51,6 +51,7 @@ TEST_CASE("no silhouette of an ellipsoid leaves its tight box") {
     gart::camera const c = gart_test::camera_of(lens, side);
     bool const sphere = c.kind == gart::camera_kind::equirectangular;
     double const last = gart_test::last_angle(c);
+    gart_test::beyond_angle const beyond(last);
     for (size_class const& size : classes) {
       long outside = 0, seen = 0, measured = 0;
       double ratio = 0;
@@ -104,7 +105,7 @@ TEST_CASE("no silhouette of an ellipsoid leaves its tight box") {
             for (int k = 0; k < (rho == 1 ? around : around / 4); ++k) {
               gart::vec3d const p = cone.at(rho, 2 * pi * k / (rho == 1 ? around : around / 4));
               double u, v;
-              if (std::atan2(std::hypot(p.x, p.y), p.z) > last) {
+              if (beyond(p)) {
                 whole = false;
                 continue;
               }

@@ -69,11 +69,11 @@ inline void image_by_definition(gart::camera const& c, double x, double y, doubl
   constexpr double pi = 3.14159265358979323846;
   if (c.kind == gart::camera_kind::equirectangular) {
     u = c.width * (std::atan2(x, z) / (2 * pi) + 0.5);
-    v = c.height * (std::atan2(y, std::hypot(x, z)) / pi + 0.5);
+    v = c.height * (std::atan2(y, std::sqrt(x * x + z * z)) / pi + 0.5);
     return;
   }
   gart::distortion const& l = c.lens;
-  double const across = std::hypot(x, y), length = std::hypot(across, z), theta = std::atan2(across, z);
+  double const across = std::sqrt(x * x + y * y);
   double q = 0;
   switch (c.kind) {
     case gart::camera_kind::perspective:
@@ -93,7 +93,7 @@ inline void image_by_definition(gart::camera const& c, double x, double y, doubl
       break;
     }
     default:
-      q = theta;
+      q = std::atan2(across, z);
   }
   double const a = across > 0 ? q * x / across : 0, b = across > 0 ? q * y / across : 0, r2 = q * q;
   double factor = 1;
@@ -111,7 +111,6 @@ inline void image_by_definition(gart::camera const& c, double x, double y, doubl
   u = a * factor + 2 * p1 * bx * by + p2 * (b2 + 2 * bx * bx) + l.s1 * b2 + l.s2 * b2 * b2;
   v = b * factor + 2 * p2 * bx * by + p1 * (b2 + 2 * by * by) + l.s3 * b2 + l.s4 * b2 * b2;
   u = c.fx * u + c.cx, v = c.fy * v + c.cy;
-  (void)length;
 }
 
 // The largest angle with the axis that the camera gives a ray to; what lies beyond it the definition may fold back.
@@ -120,5 +119,16 @@ inline double last_angle(gart::camera const& c) {
   gart::radial_lens const model(c);
   return gart::lens_bounds(model.curve, c.fx, c.fy, c.cx, c.cy, c.width, c.height).last();
 }
+
+// Which directions lie beyond that angle, by its cosine: arc tangents of all points would take longer than their
+// images.
+class beyond_angle {
+ public:
+  explicit beyond_angle(double angle) : cosine(angle < std::acos(-1.0) ? std::cos(angle) : -2) {}
+  bool operator()(gart::vec3d const& p) const { return p.z < cosine * std::sqrt(glm::dot(p, p)); }
+
+ private:
+  double cosine;
+};
 
 }  // namespace gart_test

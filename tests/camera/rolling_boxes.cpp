@@ -4,6 +4,7 @@
 
 #include <support/policies.hpp>
 
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
@@ -29,6 +30,7 @@ struct moving_view {
   moving_pose motion;
   gart::camera view;
   double last;
+  beyond_angle beyond;
   std::function<gart::footprint(gart::ellipsoid const&)> box;
 
   moving_view(std::mt19937_64& random, char const* name, shutter_kind shutter)
@@ -38,7 +40,8 @@ struct moving_view {
         backwards(from_end(shutter)),
         motion(random, 3 * pi / 180, 0.19),
         view(motion.rolling(lens, shutter)),
-        last(last_angle(lens)) {
+        last(last_angle(lens)),
+        beyond(last) {
     gart::visit_camera(view, [&](auto const& model) {
       box = [bounds = model.bounds(1e-4f)](gart::ellipsoid const& e) { return bounds(e); };
     });
@@ -70,6 +73,20 @@ struct moving_case : moving_view {
   }
 };
 
+// Once around in so many steps.
+struct turn {
+  double cosine, sine;
+};
+template <int Steps>
+std::array<turn, Steps + 1> const& turns() {
+  static std::array<turn, Steps + 1> const all = [] {
+    std::array<turn, Steps + 1> out;
+    for (int k = 0; k <= Steps; ++k) out[k] = {std::cos(2 * pi * k / Steps), std::sin(2 * pi * k / Steps)};
+    return out;
+  }();
+  return all;
+}
+
 // The silhouette as the camera sees it while the line at a place of the image, in pixels, is read: an ellipse of
 // directions in its axes. None where the camera is inside.
 struct silhouette {
@@ -90,9 +107,9 @@ struct silhouette {
     return silhouette{m + a * (p / p2), a * (radius * b), a * (radius * glm::cross(n, b))};
   }
   // Along the line and across it, in pixels; none past where the lens ends.
-  bool image_of(moving_case const& c, double angle, double (&out)[2]) const {
-    gart::vec3d const at = middle + one * std::cos(angle) + two * std::sin(angle);
-    if (std::atan2(std::hypot(at.x, at.y), at.z) > c.last) return false;
+  bool image_of(moving_case const& c, turn const& by, double (&out)[2]) const {
+    gart::vec3d const at = middle + one * by.cosine + two * by.sine;
+    if (c.beyond(at)) return false;
     double uv[2];
     image_by_definition(c.lens, at.x, at.y, at.z, uv[0], uv[1]);
     out[0] = uv[c.columns], out[1] = uv[!c.columns];
@@ -113,20 +130,25 @@ struct seen_box {
 
 // Line by line, where the silhouette as it is then crosses the middles of its pixels.
 std::optional<seen_box> seen_by_lines(moving_case const& c) {
-  constexpr int around = 240;
+  auto const& around = turns<240>();
   gart::footprint const& f = c.f;
   seen_box out{c.along(), -1, c.lines(), -1};
   int const l0 = c.columns ? f.box.x0 : f.box.y0, l1 = c.columns ? f.box.x1 : f.box.y1;
+  // What is cut is seen in some of the lines far apart, mostly: they come first.
+  std::vector<int> lines;
+  for (int line = 0; line < c.lines(); line += 16) lines.push_back(line);
   for (int line = 0; line < c.lines(); ++line) {
     // Past the seam a box goes on beyond the width.
     int const own = c.columns && f.seam && line < l0 - 20 ? line + f.seam : line;
-    if ((own < l0 - 20 || own > l1 + 20) && line % 16 != 0) continue;
+    if (own >= l0 - 20 && own <= l1 + 20 && line % 16 != 0) lines.push_back(line);
+  }
+  for (int const line : lines) {
     double const level = line + 0.5;
     auto const s = silhouette::of(c, level);
     if (!s) return {};
     double from = 1e300, to = -1e300, before[2] = {}, now[2];
-    for (int k = 0; k <= around; ++k) {
-      if (!s->image_of(c, 2 * pi * k / around, now)) return {};
+    for (std::size_t k = 0; k < around.size(); ++k) {
+      if (!s->image_of(c, around[k], now)) return {};
       if (k > 0) {
         if (silhouette::over_seam(c, before, now)) return {};
         if ((before[1] < level) != (now[1] < level)) {
@@ -139,7 +161,7 @@ std::optional<seen_box> seen_by_lines(moving_case const& c) {
     int const x0 = static_cast<int>(std::ceil(from - 0.5 + 2e-3)), x1 = static_cast<int>(std::ceil(to - 0.5 - 2e-3));
     if (!(to > from) || x1 <= x0) continue;
     if (x0 < 0 || x1 > c.along()) return {};
-    out.first = std::min(out.first, line), out.last = line + 1, out.lo = std::min(out.lo, x0),
+    out.first = std::min(out.first, line), out.last = std::max(out.last, line + 1), out.lo = std::min(out.lo, x0),
     out.hi = std::max(out.hi, x1);
   }
   if (out.last < 0) return {};
@@ -149,16 +171,16 @@ std::optional<seen_box> seen_by_lines(moving_case const& c) {
 // Around the silhouette: a point of it is seen in the line that is read as it crosses that, which a few rounds find. To
 // a fraction of a pixel, and much faster: for means over many. None where they do not: it then moves with the lines.
 std::optional<seen_box> seen_around(moving_case const& c) {
-  constexpr int around = 96;
+  auto const& around = turns<96>();
   double lo = 1e300, hi = -1e300, first = 1e300, last = -1e300, level = 0.5 * c.lines(), before[2] = {}, now[2];
   std::vector<std::optional<silhouette>> of_line(static_cast<std::size_t>(c.lines()));
-  for (int k = 0; k <= around; ++k) {
+  for (std::size_t k = 0; k < around.size(); ++k) {
     bool settled = false;
     for (int round = 0; round < 10 && !settled; ++round) {
       int const line = std::clamp(static_cast<int>(level), 0, c.lines() - 1);
       auto& s = of_line[static_cast<std::size_t>(line)];
       if (!s) s = silhouette::of(c, line + 0.5);
-      if (!s || !s->image_of(c, 2 * pi * k / around, now)) return {};
+      if (!s || !s->image_of(c, around[k], now)) return {};
       level = now[1], settled = std::abs(level - line - 0.5) < 1;
     }
     if (!settled) return {};
