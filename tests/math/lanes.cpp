@@ -94,11 +94,18 @@ TEST_CASE("lanes: numbers in turns and in fours") {
   for (gart::u32 bits : {0u, 1u, 0xa6c5u, 0xffffu}) {
     gart::lane_mask const m = gart::lanes_of(bits & ((1u << gart::lane_count) - 1));
     std::vector<float> memory(4 * stride, -1.0f);
-    gart::write_fours(memory.data(), stride, m, from);
+    gart::lane_words places;
+    for (int l = 0; l < gart::lane_count; ++l) places[l] = static_cast<gart::u32>((7 * l + 3) % gart::lane_count);
+    std::vector<float> scattered(4 * gart::lane_count, -1.0f);
+    gart::scatter_fours(scattered.data(), places, m, from);
+    for (int l = 0; l < gart::lane_count; ++l)
+      for (int k = 0; k < 4; ++k) {
+        memory[static_cast<std::size_t>(l / 4 * stride + l % 4 * 4 + k)] = m[l] ? from[k].v[l] : -1.0f;
+        CHECK(scattered[4 * places[l] + static_cast<gart::u32>(k)] == (m[l] ? from[k].v[l] : -1.0f));
+      }
     gart::read_fours(memory.data(), stride, m, to);
     for (int l = 0; l < gart::lane_count; ++l)
       for (int k = 0; k < 4; ++k) {
-        CHECK(memory[static_cast<std::size_t>(l / 4 * stride + l % 4 * 4 + k)] == (m[l] ? from[k].v[l] : -1.0f));
         CHECK(to[k].v[l] == (m[l] ? from[k].v[l] : 0.0f));
       }
   }

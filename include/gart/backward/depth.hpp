@@ -53,10 +53,11 @@ struct record_with_depth : Record {
 
 #if !defined(__CUDACC__)
   /// The same for the hits of a packet.
-  GART_INLINE lane_words operator()(typename Record::note const& at, lane_mask hits, vec3_of<lanes> const& opaque,
-                                    lanes weight, vec3_of<lanes> const& unclamped, lanes opaque_depth) const {
-    at.write_depths(depths, hits, opaque_depth);
-    return Record::operator()(at, hits, opaque, weight, unclamped);
+  GART_INLINE void operator()(lane_words places, lane_mask hits, vec3_of<lanes> const& opaque, lanes weight,
+                              vec3_of<lanes> const& unclamped, lanes opaque_depth) const {
+    Record::operator()(places, hits, opaque, weight, unclamped);
+    for (u32 left = bits_of(hits); left; left &= left - 1)
+      if (int const l = __builtin_ctz(left); places[l] != tile_slots::none) depths[places[l]] = opaque_depth.v[l];
   }
 #endif
 };

@@ -21,6 +21,23 @@ struct packet_entries {
   lane_mask clamped[3];   ///< channels of the hit's colour
 };
 
+/// Writes the slots `places` of the hits of a mask.
+template <class Entry>
+GART_INLINE void write_slots(Entry* slots, lane_words places, lane_mask hits, vec3_of<lanes> const& opaque,
+                             lanes weight, vec3_of<lanes> const& unclamped) {
+  if constexpr (std::is_same_v<Entry, hit_entry>) {
+    lanes const from[4] = {Entry::signed_by(opaque.x, unclamped.x), Entry::signed_by(opaque.y, unclamped.y),
+                           Entry::signed_by(opaque.z, unclamped.z), weight};
+    scatter_fours(reinterpret_cast<float*>(slots), places, hits, from);
+  } else {
+    for (u32 left = bits_of(hits); left; left &= left - 1) {
+      int const l = __builtin_ctz(left);
+      slots[places[l]] = Entry::of({opaque.x.v[l], opaque.y.v[l], opaque.z.v[l]}, weight.v[l],
+                                   {unclamped.x.v[l], unclamped.y.v[l], unclamped.z.v[l]});
+    }
+  }
+}
+
 /// A cell with the place of its slots.
 struct slot_cell : packet_cell {
   std::ptrdiff_t first;  ///< number of the slot of the tile's first pixel, had it one: cells may begin behind it
@@ -64,32 +81,7 @@ class packet_slots {
     }
   }
 
-  /// Writes the slots of the hits.
-  template <class Entry>
-  GART_INLINE void write(Entry* slots, lane_mask hits, vec3_of<lanes> const& opaque, lanes weight,
-                         vec3_of<lanes> const& unclamped) const {
-    hits &= inside;
-    if constexpr (std::is_same_v<Entry, hit_entry>) {
-      lanes const from[4] = {Entry::signed_by(opaque.x, unclamped.x), Entry::signed_by(opaque.y, unclamped.y),
-                             Entry::signed_by(opaque.z, unclamped.z), weight};
-      write_fours(reinterpret_cast<float*>(slots) + 4 * first_, std::ptrdiff_t{4} * width_, hits, from);
-    } else {
-      for (u32 left = bits_of(hits); left; left &= left - 1) {
-        int const l = __builtin_ctz(left);
-        slots[first_of(l)] = Entry::of({opaque.x.v[l], opaque.y.v[l], opaque.z.v[l]}, weight.v[l],
-                                       {unclamped.x.v[l], unclamped.y.v[l], unclamped.z.v[l]});
-      }
-    }
-  }
-
-  /// Writes the hits' floats of an array of one a slot.
-  GART_INLINE void write_depths(float* depths, lane_mask hits, lanes depth) const {
-    for (u32 left = bits_of(hits & inside); left; left &= left - 1) {
-      int const l = __builtin_ctz(left);
-      depths[first_of(l)] = depth.v[l];
-    }
-  }
-  /// Reads them back; zeros where there are no hits.
+  /// Reads the hits' floats of an array of one a slot; zeros where there are no hits.
   GART_INLINE lanes read_depths(float const* depths, lane_mask hits) const {
     lanes out = 0.0f;
     for (u32 left = bits_of(hits); left; left &= left - 1) {

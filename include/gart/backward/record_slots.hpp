@@ -36,18 +36,16 @@ struct record_slots {
 
 #if !defined(__CUDACC__)
   using packet_cell = slot_cell;  ///< with the place of its slots
-  using note = packet_slots;      ///< a packet's slots
-  /// The slots of a packet's pixels, asked for.
-  GART_INLINE note expect(slot_cell const& from, packet_block const& block) const {
+  /// The numbers of the slots of a packet's pixels, which are asked for.
+  GART_INLINE lane_words expect(slot_cell const& from, packet_block const& block) const {
     packet_slots const at(from, block.x % Size, block.y % Size);
     at.fetch_to_write(slots);
-    return at;
+    return select(at.inside, at.places(), every_lane(tile_slots::none));
   }
-  /// Writes the slots of the hits; their numbers.
-  GART_INLINE lane_words operator()(note const& at, lane_mask hits, vec3_of<lanes> const& opaque, lanes weight,
-                                    vec3_of<lanes> const& unclamped) const {
-    at.write(slots, hits, opaque, weight, unclamped);
-    return at.places();
+  /// Writes the slots of the hits.
+  GART_INLINE void operator()(lane_words places, lane_mask hits, vec3_of<lanes> const& opaque, lanes weight,
+                              vec3_of<lanes> const& unclamped) const {
+    write_slots(slots, places, hits & ~equal(places, every_lane(tile_slots::none)), opaque, weight, unclamped);
   }
 #endif
 };

@@ -8,6 +8,8 @@
 #include <gart/render/pixels.hpp>
 #include <gart/trace/packet_walk.hpp>
 
+#include <array>
+
 namespace gart { inline namespace GART_ISA {
 
 /// The ray program: one kernel for each policy, tracer, response and kind of rays.
@@ -49,11 +51,8 @@ static_assert(pixel_program<list_pixels<pixel_rays>>);
 
 /// The packet program of list_pixels (trace/packet_program.hpp).
 struct packet_list {
-  using cell = packet_cell;  ///< with nothing to add
-  struct note {
-    u32 id;
-  };
-  struct shaded {};
+  using cell = packet_cell;             ///< with nothing to add
+  using shaded = std::array<lanes, 0>;  ///< nothing
   /// The rays of a packet on their way.
   struct state {
     lane_mask inside;                    ///< lanes whose pixel is of the image
@@ -78,17 +77,17 @@ struct packet_list {
     return s;
   }
   /// Which Gaussian it is.
-  GART_INLINE note expect(state const&, cell const& from) const { return {from.id}; }
+  GART_INLINE lane_words expect(state const&, cell const& from) const { return every_lane(from.id); }
   /// Does nothing.
   GART_INLINE void fetch(u32) const {}
   /// Nothing.
   GART_INLINE shaded shade(state const&, u32) const { return {}; }
-  /// Takes the hits of a Gaussian with the rays of `now`. The rays that go on.
-  GART_INLINE lane_mask on_hit(state& s, lane_mask now, lanes t, lanes alpha, shaded const&, note const& at) const {
+  /// Takes a hit of each ray of `now`. The rays that go on.
+  GART_INLINE lane_mask on_hit(state& s, lane_mask now, lanes t, lanes alpha, shaded const&, lane_words ids) const {
     u32 on = 0;
     for (u32 left = bits_of(now & s.inside); left; left &= left - 1) {
       int const l = __builtin_ctz(left);
-      on |= (program.to.on_hit(s.rays[l], {t.v[l], at.id, alpha.v[l]}) ? 1u : 0u) << l;
+      on |= (program.to.on_hit(s.rays[l], {t.v[l], ids[l], alpha.v[l]}) ? 1u : 0u) << l;
     }
     return lanes_of(on);
   }

@@ -102,17 +102,12 @@ GART_INLINE void write_interleaved(float* out, int n, lanes a, lanes b, lanes c)
 #endif
 }
 
-/// Four numbers a lane, where they lie together in memory: lanes 4 r to 4 r + 3 one after another from
-/// `first` + r `stride` (in floats). Lanes that are not in the mask are not touched, and read as zeros.
+/// Four numbers a lane to memory: from `first` + 4 places[l] on, for the lanes of the mask.
+GART_INLINE void scatter_fours(float* first, lane_words places, lane_mask m, lanes const (&from)[4]) {
+  u32 const bits = bits_of(m);
 #if defined(GART_LANES_AVX512)
-namespace detail {
-// Each of the 4 lanes of a row, four times: a bit a float.
-GART_INLINE __mmask16 floats_of_row(lane_mask m, int row) {
-  return static_cast<__mmask16>(_pdep_u32(static_cast<u32>(m.m) >> (4 * row), 0x1111u) * 15u);
-}
-}  // namespace detail
-
-GART_INLINE void write_fours(float* first, std::ptrdiff_t stride, lane_mask m, lanes const (&from)[4]) {
+  // Numbers and lanes change places; then each lane's four are a store. Lanes that are not in the mask go astray: a
+  // branch each would be predicted badly.
   __m512i const low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
   __m512i const low_pairs = _mm512_setr_epi64(0, 8, 1, 9, 2, 10, 3, 11);
   __m512i const high = _mm512_add_epi32(low, _mm512_set1_epi32(8));
@@ -120,15 +115,53 @@ GART_INLINE void write_fours(float* first, std::ptrdiff_t stride, lane_mask m, l
   auto const zip = [](lanes a, lanes b, __m512i how) {
     return _mm512_castps_pd(_mm512_permutex2var_ps((__m512)a.v, how, (__m512)b.v));
   };
-  auto const put = [&](int row, __m512d ab, __m512d cd, __m512i how) {
-    _mm512_mask_storeu_ps(first + row * stride, detail::floats_of_row(m, row),
-                          _mm512_castpd_ps(_mm512_permutex2var_pd(ab, how, cd)));
+  alignas(64) float astray[4];
+  alignas(64) u32 to[lane_count];
+  _mm512_store_si512(to, (__m512i)places);
+  auto const put = [&]<int Row>(std::integral_constant<int, Row>, __m512d ab, __m512d cd, __m512i how) {
+    __m512 const four = _mm512_castpd_ps(_mm512_permutex2var_pd(ab, how, cd));
+    auto const one = [&]<int K>(std::integral_constant<int, K>) {
+      constexpr int l = 4 * Row + K;
+      _mm_storeu_ps(bits >> l & 1 ? first + std::size_t{4} * to[l] : astray, _mm512_maskz_extractf32x4_ps(15, four, K));
+    };
+    one(std::integral_constant<int, 0>{}), one(std::integral_constant<int, 1>{});
+    one(std::integral_constant<int, 2>{}), one(std::integral_constant<int, 3>{});
   };
   __m512d const ab0 = zip(from[0], from[1], low), ab1 = zip(from[0], from[1], high);
   __m512d const cd0 = zip(from[2], from[3], low), cd1 = zip(from[2], from[3], high);
-  put(0, ab0, cd0, low_pairs), put(1, ab0, cd0, high_pairs);
-  put(2, ab1, cd1, low_pairs), put(3, ab1, cd1, high_pairs);
+  put(std::integral_constant<int, 0>{}, ab0, cd0, low_pairs);
+  put(std::integral_constant<int, 1>{}, ab0, cd0, high_pairs);
+  put(std::integral_constant<int, 2>{}, ab1, cd1, low_pairs);
+  put(std::integral_constant<int, 3>{}, ab1, cd1, high_pairs);
+#elif defined(__AVX2__)
+  __m256 const a = (__m256)from[0].v, b = (__m256)from[1].v, c = (__m256)from[2].v, d = (__m256)from[3].v;
+  __m256 const ab_low = _mm256_unpacklo_ps(a, b), ab_high = _mm256_unpackhi_ps(a, b);
+  __m256 const cd_low = _mm256_unpacklo_ps(c, d), cd_high = _mm256_unpackhi_ps(c, d);
+  // Of lanes k and k + 4.
+  __m256 const fours[4] = {_mm256_shuffle_ps(ab_low, cd_low, 0x44), _mm256_shuffle_ps(ab_low, cd_low, 0xee),
+                           _mm256_shuffle_ps(ab_high, cd_high, 0x44), _mm256_shuffle_ps(ab_high, cd_high, 0xee)};
+  alignas(16) float astray[4];
+  for (int k = 0; k < 4; ++k) {
+    _mm_storeu_ps(bits >> k & 1 ? first + std::size_t{4} * places[k] : astray, _mm256_castps256_ps128(fours[k]));
+    _mm_storeu_ps(bits >> k & 16 ? first + std::size_t{4} * places[k + 4] : astray, _mm256_extractf128_ps(fours[k], 1));
+  }
+#else
+  for (u32 left = bits; left; left &= left - 1) {
+    int const l = __builtin_ctz(left);
+    for (int k = 0; k < 4; ++k) first[std::size_t{4} * places[l] + static_cast<std::size_t>(k)] = from[k].v[l];
+  }
+#endif
 }
+
+/// Reads four numbers a lane that lie together in memory: lanes 4 r to 4 r + 3 one after another from `first` +
+/// r `stride` (in floats). Lanes that are not in the mask read as zeros.
+#if defined(GART_LANES_AVX512)
+namespace detail {
+// Each of the 4 lanes of a row, four times: a bit a float.
+GART_INLINE __mmask16 floats_of_row(lane_mask m, int row) {
+  return static_cast<__mmask16>(_pdep_u32(static_cast<u32>(m.m) >> (4 * row), 0x1111u) * 15u);
+}
+}  // namespace detail
 
 GART_INLINE void read_fours(float const* first, std::ptrdiff_t stride, lane_mask m, lanes (&to)[4]) {
   __m512i const even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
@@ -148,24 +181,6 @@ GART_INLINE void read_fours(float const* first, std::ptrdiff_t stride, lane_mask
   to[2] = unzip(cd0, cd1, even), to[3] = unzip(cd0, cd1, odd);
 }
 #elif defined(__AVX2__)
-GART_INLINE void write_fours(float* first, std::ptrdiff_t stride, lane_mask m, lanes const (&from)[4]) {
-  __m256 const a = (__m256)from[0].v, b = (__m256)from[1].v, c = (__m256)from[2].v, d = (__m256)from[3].v;
-  __m256 const ab_low = _mm256_unpacklo_ps(a, b), ab_high = _mm256_unpackhi_ps(a, b);
-  __m256 const cd_low = _mm256_unpacklo_ps(c, d), cd_high = _mm256_unpackhi_ps(c, d);
-  // The lanes of both rows in a column.
-  __m256 const columns[4] = {_mm256_shuffle_ps(ab_low, cd_low, 0x44), _mm256_shuffle_ps(ab_low, cd_low, 0xee),
-                             _mm256_shuffle_ps(ab_high, cd_high, 0x44), _mm256_shuffle_ps(ab_high, cd_high, 0xee)};
-  u32 const bits = bits_of(m);
-  // Lanes that are not in the mask go astray: a branch each would be predicted badly.
-  alignas(16) float astray[4];
-  for (int k = 0; k < 4; ++k) {
-    float* const above = first + 4 * k;
-    float* const below = above + stride;
-    _mm_storeu_ps(bits >> k & 1 ? above : astray, _mm256_castps256_ps128(columns[k]));
-    _mm_storeu_ps(bits >> k & 16 ? below : astray, _mm256_extractf128_ps(columns[k], 1));
-  }
-}
-
 GART_INLINE void read_fours(float const* first, std::ptrdiff_t stride, lane_mask m, lanes (&to)[4]) {
   auto const column = [&]<int K>(std::integral_constant<int, K>) {
     __m256i const twice = _mm256_shuffle_epi32((__m256i)m.m, 0x55 * K);
@@ -183,15 +198,6 @@ GART_INLINE void read_fours(float const* first, std::ptrdiff_t stride, lane_mask
   to[3] = (lanes::vector)_mm256_shuffle_ps(ab_high, cd_high, 0xee);
 }
 #else
-GART_INLINE void write_fours(float* first, std::ptrdiff_t stride, lane_mask m, lanes const (&from)[4]) {
-  for (u32 left = bits_of(m); left; left &= left - 1) {
-    int const l = __builtin_ctz(left);
-    float* const at = first + l / 4 * stride + l % 4 * 4;
-    for (int k = 0; k < 4; ++k) at[k] = from[k].v[l];
-  }
-}
-
-/// Reads them back.
 GART_INLINE void read_fours(float const* first, std::ptrdiff_t stride, lane_mask m, lanes (&to)[4]) {
   for (lanes& one : to) one = 0.0f;
   for (u32 left = bits_of(m); left; left &= left - 1) {

@@ -11,6 +11,7 @@
 #include <gart/math/arith.hpp>
 
 #include <cstddef>
+#include <cstring>
 
 #if !defined(__CUDACC__)
 
@@ -173,6 +174,40 @@ GART_INLINE lane_mask lanes_of(u32 bits) {
 }
 /// Whether any lane is set.
 GART_INLINE bool any(lane_mask m) { return bits_of(m) != 0; }
+
+///@{
+/// from[at[l]] of floats or words that begin at `from`, a lane.
+GART_INLINE lanes gather(lanes const* from, lane_words at) {
+#if defined(GART_LANES_AVX512)
+  return (lanes::vector)_mm512_mask_i32gather_ps(_mm512_setzero_ps(), 0xffff, (__m512i)at, from, 4);
+#elif defined(__AVX2__)
+  return (lanes::vector)_mm256_i32gather_ps(reinterpret_cast<float const*>(from), (__m256i)at, 4);
+#else
+  lanes r;
+  for (int l = 0; l < lane_count; ++l) {
+    float one;
+    std::memcpy(&one, reinterpret_cast<char const*>(from) + sizeof one * at[l], sizeof one);
+    r.v[l] = one;
+  }
+  return r;
+#endif
+}
+GART_INLINE lane_words gather(lane_words const* from, lane_words at) {
+#if defined(GART_LANES_AVX512)
+  return (lane_words)_mm512_mask_i32gather_epi32(_mm512_setzero_si512(), 0xffff, (__m512i)at, from, 4);
+#elif defined(__AVX2__)
+  return (lane_words)_mm256_i32gather_epi32(reinterpret_cast<int const*>(from), (__m256i)at, 4);
+#else
+  lane_words r;
+  for (int l = 0; l < lane_count; ++l) {
+    u32 one;
+    std::memcpy(&one, reinterpret_cast<char const*>(from) + sizeof one * at[l], sizeof one);
+    r[l] = one;
+  }
+  return r;
+#endif
+}
+///@}
 
 /// Hides the latency of memory: asks for what will be read, or written, some time before.
 GART_INLINE void prefetch(void const* p) { __builtin_prefetch(p); }

@@ -111,10 +111,9 @@ struct composite : ray_program_base {
 
   /// A hit with the rays of a mask, or with the one ray there is. The record identifies the hit by `place`. The rays
   /// that let through enough to go on, whatever the cap.
-  template <class F, class Place>
+  template <class F>
   GART_HD GART_INLINE auto blend_hit(composited_hits<F>& s, typename number<F>::mask now, F t, F alpha,
-                                     vec3_of<F> const& unclamped, Place const& place) const {
-    using words = typename number<F>::words;
+                                     vec3_of<F> const& unclamped, typename number<F>::words const& place) const {
     F const zero = 0.0f;
     vec3_of<F> const c = clamped_color(unclamped);
     [[maybe_unused]] vec3_of<F> const opaque = opaque_color(c, s.color, s.transmittance);
@@ -127,13 +126,12 @@ struct composite : ray_program_base {
       else
         return record(where..., opaque, weight, unclamped);
     };
-    words places;
     if constexpr (std::is_same_v<F, float>)
-      note(place), places = place;
+      note(place);
     else
-      places = note(place, now);
+      note(place, now);
     s.hits += select(now, number<F>::every(1), number<F>::every(0));
-    s.last_t = select(now, t, s.last_t), s.last_place = select(now, places, s.last_place);
+    s.last_t = select(now, t, s.last_t), s.last_place = select(now, place, s.last_place);
     return s.transmittance >= F(options.transmittance_min);
   }
 

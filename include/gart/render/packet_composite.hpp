@@ -5,6 +5,8 @@
 #include <gart/render/composite.hpp>
 #include <gart/trace/packet_walk.hpp>
 
+#include <array>
+
 #if !defined(__CUDACC__)
 
 namespace gart { inline namespace GART_ISA {
@@ -14,9 +16,7 @@ template <int ShDegree, hit_record Record>
 struct packet_composite {
   /// A Gaussian's box in the tile, with the data for the record.
   using cell = typename Record::packet_cell;
-  /// Where the record writes a Gaussian's hits.
-  using note = typename Record::note;
-  using shaded = vec3_of<lanes>;  ///< colour before the clamp
+  using shaded = std::array<lanes, 3>;  ///< colour before the clamp
   /// The rays of a packet on their way.
   struct state : composited_hits<lanes> {
     packet_block block;               ///< whose rays they are
@@ -46,8 +46,8 @@ struct packet_composite {
     return s;
   }
 
-  /// The place where the record will write the hits of a cell's Gaussian.
-  GART_INLINE note expect(state const& s, cell const& from) const { return program.record.expect(from, s.block); }
+  /// The places where the record will write the hits of a cell's Gaussian.
+  GART_INLINE lane_words expect(state const& s, cell const& from) const { return program.record.expect(from, s.block); }
   /// Asks for the row of coefficients of Gaussian `id`.
   GART_INLINE void fetch(u32 id) const {
     constexpr std::size_t stride = 3 * sh_basis<ShDegree>::size;
@@ -58,13 +58,15 @@ struct packet_composite {
   /// The colours of Gaussian `id` along the rays.
   GART_INLINE shaded shade(state const& s, u32 id) const {
     constexpr std::size_t stride = 3 * sh_basis<ShDegree>::size;
-    return s.basis.unclamped(program.sh + stride * id, sh_coefficients(program.active_degree));
+    vec3_of<lanes> const c = s.basis.unclamped(program.sh + stride * id, sh_coefficients(program.active_degree));
+    return {c.x, c.y, c.z};
   }
 
-  /// Composites a Gaussian's hits with the rays of `now`. The rays that go on.
+  /// Composites a hit of each ray of `now`. The rays that go on.
   GART_INLINE lane_mask on_hit(state& s, lane_mask now, lanes t, lanes alpha, shaded const& unclamped,
-                               note const& at) const {
-    lane_mask on = program.blend_hit(s, now, t, alpha, unclamped, at);
+                               lane_words places) const {
+    vec3_of<lanes> const color{unclamped[0], unclamped[1], unclamped[2]};
+    lane_mask on = program.blend_hit(s, now, t, alpha, color, places);
     if (program.options.max_hits > 0) on &= ~equal(s.hits, every_lane(program.options.max_hits));
     return on;
   }

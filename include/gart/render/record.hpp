@@ -2,7 +2,7 @@
 /// \file
 /// The record of each hit that the forward pass leaves for the backward pass; part of a method
 /// (backward/gradient_method.hpp). A record says where a hit belongs when it is found. It is called once a hit, after
-/// compositing. On hosts it also takes the hits of one Gaussian with a packet of rays at once (trace/packet_walk.hpp).
+/// compositing. On hosts it also takes a hit of each ray of a packet at once (trace/packet_walk.hpp).
 
 #include <gart/render/pixels.hpp>
 #include <gart/trace/hit.hpp>
@@ -22,12 +22,10 @@ concept packet_record = true;
 #else
 template <class R>
 concept packet_record = requires(R const& r, packet_block const& block, typename R::packet_cell const& cell,
-                                 typename R::note const& note, lane_mask hits, vec3_of<lanes> const& color, lanes x) {
-  typename R::packet_cell;  // as packet_program has them
-  typename R::note;
-  { r.expect(cell, block) } -> std::same_as<typename R::note>;
-  // As below, for the hits of a mask; their places.
-  { r(note, hits, color, x, color) } -> std::same_as<lane_words>;
+                                 lane_words places, lane_mask hits, vec3_of<lanes> const& color, lanes x) {
+  typename R::packet_cell;                                // as packet_program has it
+  { r.expect(cell, block) } -> std::same_as<lane_words>;  // the places of the packet's pixels
+  r(places, hits, color, x, color);                       // as below, for the hits of a mask
 };
 #endif
 
@@ -66,13 +64,10 @@ struct record_none {
 
 #if !defined(__CUDACC__)
   using packet_cell = gart::packet_cell;  ///< with nothing to add
-  struct note {};
-  /// Nothing.
-  note expect(packet_cell const&, packet_block const&) const { return {}; }
-  /// Does nothing; places are 0.
-  lane_words operator()(note, lane_mask, vec3_of<lanes> const&, lanes, vec3_of<lanes> const&) const {
-    return every_lane(0);
-  }
+  /// Always 0.
+  lane_words expect(packet_cell const&, packet_block const&) const { return every_lane(0); }
+  /// Does nothing.
+  void operator()(lane_words, lane_mask, vec3_of<lanes> const&, lanes, vec3_of<lanes> const&) const {}
 #endif
 };
 static_assert(hit_record<record_none>);

@@ -1,12 +1,13 @@
 // expects: p.expect(s, cell)
 #include <gart/trace/packet_program.hpp>
 
+#include <array>
+
 using gart::lane_mask, gart::lanes, gart::packet_block, gart::u32;
 
 struct depths {
   using cell = gart::packet_cell;
-  struct note {};
-  struct shaded {};
+  using shaded = std::array<lanes, 0>;
   struct state {
     gart::vec3_of<lanes> directions;
     lane_mask inside;
@@ -18,11 +19,11 @@ struct depths {
     return s;
   }
 #ifdef GART_WHOLE
-  note expect(state const&, cell const&) const { return {}; }
+  gart::lane_words expect(state const&, cell const&) const { return {}; }
 #endif
   void fetch(u32) const {}
   shaded shade(state const&, u32) const { return {}; }
-  lane_mask on_hit(state& s, lane_mask rays, lanes t, lanes, shaded const&, note const&) const {
+  lane_mask on_hit(state& s, lane_mask rays, lanes t, lanes, shaded const&, gart::lane_words) const {
     s.depth = t;
     return rays;
   }
