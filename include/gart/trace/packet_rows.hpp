@@ -5,8 +5,8 @@
 /// Gaussian, since its hits are found and shaded together. A hit is put in its place from the last row on: most are
 /// farther than most that wait.
 ///
-/// Memory: 256 rows, 1,024 Gaussians; what is not used is not touched. Cost: hits of a Gaussian take ten instructions
-/// a row that they go before. A row that is passed on takes as many a row behind it, unless it is of all rays.
+/// Memory: 256 rows, 1,024 Gaussians; what is not used is not touched. Cost: hits of a Gaussian take a comparison and
+/// four blends a row that they go before. A row that is passed on takes two blends a row behind it, unless all rays go.
 
 #include <gart/math/lanes.hpp>
 

@@ -121,16 +121,17 @@ class packet_walk {
   }
 
   // Hits nearer than all that is left of the list go to the program, a hit of each ray at a time. A step costs the same
-  // for one ray as for all. So few wait for more, while there is room.
+  // for one ray as for all. So few of those that have hits wait for the others, while there is room.
   template <class State>
   void pass_on(P const& program, State& state, lanes const& depth_of_t, float bound) {
     while (rows_.size() > 0) {
       lanes const t = rows_.nearest();
       lane_mask now = rows_.filled();
       if (bound != no_bound) {
+        int const waiting = __builtin_popcount(bits_of(now));
         now &= t * depth_of_t < lanes(bound);
         int const ready = __builtin_popcount(bits_of(now));
-        if (ready == 0 || (4 * ready < 3 * __builtin_popcount(bits_of(alive_)) && rows_.size() < crowd)) return;
+        if (ready == 0 || (4 * ready < 3 * waiting && rows_.size() < crowd)) return;
       }
       waiting_hits<shaded> const h = rows_.nearest_hits(now);
       lane_mask const ended = now & ~program.on_hit(state, now, t, h.alpha, h.shown, h.places);
