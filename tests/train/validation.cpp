@@ -11,15 +11,12 @@
 
 namespace {
 
-constexpr int views = 48;
 gart::configuration_request const serial{gart::backend_kind::serial, gart::tracer_kind::automatic, "auto", 1};
 
 // Noisy photographs of a cloud, from all around it. `exposed`: each third of the way round at another exposure;
-// `lit`: the cloud is bright on one side and dark on the other, and the walls behind it with it. `small`: of a quarter
-// of the pixels, for what does not depend on how good a training is.
-enum class sized { whole, small };
-gart::dataset capture(std::uint64_t seed, bool exposed, bool lit, sized of = sized::whole) {
-  int const width = of == sized::small ? 16 : 32, height = of == sized::small ? 13 : 26;
+// `lit`: the cloud is bright on one side and dark on the other.
+gart::dataset capture(std::uint64_t seed, bool exposed, bool lit, int views = 48) {
+  constexpr int width = 16, height = 13;
   std::mt19937_64 engine(seed);
   std::normal_distribution<float> normal;
   gart::gaussian_model truth;
@@ -50,11 +47,12 @@ gart::dataset capture(std::uint64_t seed, bool exposed, bool lit, sized of = siz
     view.view.width = width, view.view.height = height;
     view.view.cx = 0.5f * static_cast<float>(width), view.view.cy = 0.5f * static_cast<float>(height);
     view.view.fx = view.view.fy = 35.0f / 16 * view.view.cx;
-    float const angle = 6.2831853f * static_cast<float>(v) / views, c = std::cos(angle), s = std::sin(angle);
+    float const angle = 6.2831853f * static_cast<float>(v) / static_cast<float>(views), c = std::cos(angle),
+                s = std::sin(angle);
     view.view.rotation = gart::mat3(gart::vec3(c, 0, -s), gart::vec3(0, 1, 0), gart::vec3(s, 0, c));
     view.view.position = gart::vec3d(-4.0 * s, 0, -4.0 * c);
     auto const picture = renderer->render(view.view, gart::render_options{});
-    float const gain = exposed && v / 8 % 2 ? 0.6f : 1.0f;
+    float const gain = exposed && v / (views / 6) % 2 ? 0.6f : 1.0f;
     view.image = gart::image8(width, height, 3);
     for (std::size_t i = 0; i < picture.color.data.size(); ++i) {
       float const noisy = 255 * gain * picture.color.data[i] + 4 * normal(engine);
@@ -81,14 +79,17 @@ std::vector<gart::candidate> some(std::size_t count) {
 TEST_CASE("differing exposures are found, uneven light is not") {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
-  auto const exposed = gart::validate(serial, options(), capture(seed, true, false), exposures());
+  // The verdict is at a loss of two noises. A trial visits each of so many views five times, where exposures lose five
+  // noises or more, by each of eight seeds. With 48 views they lost 1 to 3, and the seed decided.
+  constexpr int views = 192;
+  auto const exposed = gart::validate(serial, options(), capture(seed, true, false, views), exposures());
   REQUIRE(exposed.trials.size() == 2);
   CAPTURE(exposed.trials[1].gain);
   CAPTURE(exposed.trials[1].noise);
   CHECK(exposed.options.exposure);
   CHECK(exposed.trials[1].taken);
   CHECK(exposed.trials[1].gain > 1);
-  auto const lit = gart::validate(serial, options(), capture(seed, false, true), exposures());
+  auto const lit = gart::validate(serial, options(), capture(seed, false, true, views), exposures());
   REQUIRE(lit.trials.size() == 2);
   CAPTURE(lit.trials[1].gain);
   CAPTURE(lit.trials[1].noise);
@@ -99,7 +100,7 @@ TEST_CASE("differing exposures are found, uneven light is not") {
 TEST_CASE("held-out training views decide, test views do not") {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
-  auto const data = capture(seed, false, false, sized::small);
+  auto const data = capture(seed, false, false);
   auto const plan = gart::plan_validation(options(), data, some(1));
   CHECK(plan.held_out == std::vector<std::size_t>{2, 6, 10, 14, 18, 22, 26, 30, 34, 38, 42, 46});
   CHECK(plan.trials == 2);
@@ -217,7 +218,7 @@ TEST_CASE("what changes nothing of a run is no candidate") {
 }
 
 TEST_CASE("trials that are ended count for nothing") {
-  auto const data = capture(gart_test::seed(), true, false, sized::small);
+  auto const data = capture(gart_test::seed(), true, false);
   int left = 900;  // the first trial and some of the next
   auto const ended =
       gart::validate(serial, options(), data, exposures(), [&](double, auto const&) { return --left > 0; });
