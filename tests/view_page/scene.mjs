@@ -17,6 +17,9 @@ const description = {
   options: {samples, bounces: 2, tone_map: 'srgb'},
 };
 
+// Paths cost by the pixel: the desk has a smaller window here.
+const smaller = (screen) => (screen.isMobile ? screen : {viewport: {width: 900, height: 600}});
+
 async function serve({gart, work}, options) {
   // Each twice: the bounds leave out the last in a hundred.
   const balls = [[-1, 0, 0, 0.2, [0.9, 0.2, 0.2]], [1, 0.3, 0.4, 0.25, [0.2, 0.6, 0.9]], [0, -1, 0, 0.15, [0.3, 0.8, 0.3]]];
@@ -32,7 +35,7 @@ async function end(server) {
 // A page whose list has the ball chosen; at(): where the stage shows a point.
 async function openBall(world, screen) {
   const server = await serve(world, oneSample);
-  const p = await openPage(world.browser, server.control, screen);
+  const p = await openPage(world.browser, server.control, smaller(screen));
   await p.tab('scene');
   await p.page.click('#scene-list button:has-text("ball")');
   await p.until('the box about it', async () => (await linesOf(p.page, [255, 209, 102])) > 100);
@@ -116,7 +119,7 @@ const changed = onEach({
     assert.deepEqual(file.models, description.models);
     await p.close();
 
-    const onlooker = await openPage(browser, server.look, screen);
+    const onlooker = await openPage(browser, server.look, smaller(screen));
     await onlooker.tab('scene');
     assert.equal(await onlooker.page.isVisible('#scene-onlooker'), true);
     await onlooker.page.click('#scene-list button:has-text("ball")');
@@ -173,7 +176,7 @@ const turned = onEach({
 const added = onEach({
   async 'a mesh that is dropped or chosen is in the scene, what is wrong is said'(world, screen) {
     const server = await serve(world, oneSample), {browser} = world;
-    const p = await openPage(browser, server.control, screen);
+    const p = await openPage(browser, server.control, smaller(screen));
     await p.tab('scene');
     const said = (part) => p.until(`"${part}"`, async () => (await p.page.textContent('#say')).includes(part));
     const drop = (name, text) => p.page.evaluate(([file, content]) => {
