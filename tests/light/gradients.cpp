@@ -4,40 +4,14 @@
 
 #include <light/double_light.hpp>
 #include <light/small_scenes.hpp>
+#include <support/kept_results.hpp>
 
-#include <map>
 #include <string>
 #include <vector>
 
 using namespace gart_test;
 
 namespace {
-
-// Images by definition take nearly all of the time, and no policy changes them: those of a scene that has a name are
-// made once, and handed out again in the same order.
-class kept_images {
- public:
-  explicit kept_images(std::string const& scene) {
-    static std::map<std::string, std::vector<entry>> known;
-    entries_ = &known[scene];
-  }
-  // `which`: the number in which the model of this image is another.
-  template <class F>
-  std::vector<double> const& of(float which, F const& image) {
-    if (next_ == entries_->size()) entries_->push_back({which, image()});
-    entry const& e = (*entries_)[next_++];
-    REQUIRE(e.which == which);
-    return e.image;
-  }
-
- private:
-  struct entry {
-    float which;
-    std::vector<double> image;
-  };
-  std::vector<entry>* entries_;
-  std::size_t next_ = 0;
-};
 
 // A scene's image, and the gradients of a random loss of it. `name` is that of the scene.
 template <class E>
@@ -76,7 +50,8 @@ void check_gradients(char const* name, std::uint64_t seed, gart::gaussian_model 
   mirrors.set_scene(scene), mirrors.set_model(there.view(), 1);
   gart::buffer<float, E> color(exec, 3 * pixels);
   mirrors.forward(view, options, paths, color.data());
-  kept_images kept(name);
+  // Images by definition; `place` is the number in which the model of an image is another.
+  kept_results<float, std::vector<double>> kept(name);
   std::vector<double> const expected = kept.of(0, [&] { return image(model); });
   auto const got = color.to_host();
   // Where floats put a hit on the other side of a surface, or of another hit, than doubles, both are right.

@@ -3,9 +3,10 @@
 
 #include <rays/double_rays.hpp>
 #include <rays/view_rays.hpp>
+#include <support/kept_results.hpp>
 
 #include <cmath>
-#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -95,9 +96,9 @@ class comparison {
 
 inline constexpr double difference_step = 1e-5;
 
-// d loss / d x by four values, where none is on another branch; of all rays or one. False: a step was crossed.
+// d loss / d x by four values, of all rays or one. Nothing where one is on another branch: a step was crossed.
 template <class F>
-bool slope(double& x, F const& loss, double& out) {
+std::optional<double> slope(double& x, F const& loss) {
   double const at = x;
   std::uint64_t const branches = loss().branches;
   bool smooth = true;
@@ -108,40 +109,17 @@ bool slope(double& x, F const& loss, double& out) {
     return s.loss;
   };
   constexpr double h = difference_step;
-  out = (8 * (value(h) - value(-h)) - (value(2 * h) - value(-2 * h))) / (12 * h);
+  double const found = (8 * (value(h) - value(-h)) - (value(2 * h) - value(-2 * h))) / (12 * h);
   x = at;
-  return smooth;
+  return smooth ? std::optional(found) : std::nullopt;
 }
 
-// Slopes take nearly all of a test's time, and neither a policy nor the form of its gradients changes them: they are
-// found once for the inputs that have a name, and then handed out again in the same order.
-class kept_slopes {
- public:
-  explicit kept_slopes(std::string const& inputs) {
-    static std::map<std::string, std::vector<entry>> known;
-    entries_ = &known[inputs];
-  }
-  template <class F>
-  bool slope(double& x, F const& loss, double& out) {
-    if (next_ == entries_->size()) {
-      entry found{x, 0, false};
-      found.smooth = gart_test::slope(x, loss, found.slope);
-      entries_->push_back(found);
-    }
-    entry const& e = (*entries_)[next_++];
-    REQUIRE(e.at == x);
-    out = e.slope;
-    return e.smooth;
-  }
-
- private:
-  struct entry {
-    double at, slope;
-    bool smooth;
-  };
-  std::vector<entry>* entries_;
-  std::size_t next_ = 0;
-};
+// The same, of inputs that have a name.
+using kept_slopes = kept_results<double, std::optional<double>>;
+template <class F>
+std::optional<double> const& slope(kept_slopes& kept, double& x, F const& loss) {
+  return kept.of(x, [&] { return slope(x, loss); });
+}
 
 // All rays of a sweep, each seen by f(i).
 template <class F>
@@ -166,11 +144,11 @@ inline void compare(std::string const& inputs, gart::gaussian_model const& model
     comparison c;
     std::size_t const step = values.size() > 60 ? values.size() / 60 : 1;
     for (std::size_t i = 0; i < values.size(); i += step) {
-      double expected = 0;
       ++tried;
-      if (!kept.slope(values[i], loss, expected)) continue;
+      auto const expected = slope(kept, values[i], loss);
+      if (!expected) continue;
       ++used;
-      c.add(double{by[i]}, expected);
+      c.add(double{by[i]}, *expected);
     }
     CHECK(c.relative() < 1e-4);
   };
@@ -187,9 +165,8 @@ inline void compare(std::string const& inputs, gart::gaussian_model const& model
     double_ray r = s.ray(i);
     auto const of_ray = [&] { return see(m, r, s.weights(i), options); };
     for (std::size_t k = 0; k < 3; ++k) {
-      double expected = 0;
-      if (kept.slope(r.origin[k], of_ray, expected)) origin.add(double{got.origins[3 * i + k]}, expected);
-      if (kept.slope(r.direction[k], of_ray, expected)) direction.add(double{got.directions[3 * i + k]}, expected);
+      if (auto const of = slope(kept, r.origin[k], of_ray)) origin.add(double{got.origins[3 * i + k]}, *of);
+      if (auto const of = slope(kept, r.direction[k], of_ray)) direction.add(double{got.directions[3 * i + k]}, *of);
     }
   }
   CHECK(origin.relative() < 1e-4);
