@@ -68,6 +68,19 @@ struct cuda_exec::resources {
   std::vector<stage> open, closed;
   block staging[staging_blocks];
   std::size_t next_block = 0;
+  block early;  // what end_copy_out reads
+  std::size_t early_bytes = 0;
+
+  // Room for so many bytes on the host, and the event that tells that they are there.
+  static void make(block& of, std::size_t bytes) {
+    if (!of.copied) check_cuda(cudaEventCreateWithFlags(&of.copied, cudaEventDisableTiming), "creating an event");
+    if (!of.bytes) check_cuda(cudaMallocHost(&of.bytes, bytes), "allocating pinned memory");
+  }
+
+  static void destroy(block const& of) {
+    if (of.bytes) cudaFreeHost(of.bytes);
+    if (of.copied) cudaEventDestroy(of.copied);
+  }
 
   cudaEvent_t take_event() {
     if (!spare.empty()) {
@@ -87,10 +100,8 @@ struct cuda_exec::resources {
         cudaEventDestroy(stage.stop);
       }
     for (auto event : spare) cudaEventDestroy(event);
-    for (auto const& block : staging) {
-      if (block.bytes) cudaFreeHost(block.bytes);
-      if (block.copied) cudaEventDestroy(block.copied);
-    }
+    for (auto const& block : staging) destroy(block);
+    destroy(early);
     if (pool) cudaMemPoolDestroy(pool);
   }
 };
@@ -194,8 +205,7 @@ void cuda_exec::copy_in(void* dst, void const* src, std::size_t bytes) {
   while (bytes > 0) {
     auto& block = resources_->staging[resources_->next_block];
     resources_->next_block = (resources_->next_block + 1) % staging_blocks;
-    if (!block.copied) check_cuda(cudaEventCreateWithFlags(&block.copied, cudaEventDisableTiming), "creating an event");
-    if (!block.bytes) check_cuda(cudaMallocHost(&block.bytes, staging_bytes), "allocating pinned memory");
+    resources::make(block, staging_bytes);
     check_cuda(cudaEventSynchronize(block.copied), "waiting for an upload");
     std::size_t const part = std::min(bytes, staging_bytes);
     std::memcpy(block.bytes, from, part);
@@ -210,6 +220,27 @@ void cuda_exec::copy_in(void* dst, void const* src, std::size_t bytes) {
 void cuda_exec::copy_out(void* dst, void const* src, std::size_t bytes) {
   if (bytes) check_cuda(cudaMemcpyAsync(dst, src, bytes, cudaMemcpyDeviceToHost, as_stream(stream_)), "downloading");
   synchronize();
+}
+
+void cuda_exec::begin_copy_out(void const* src, std::size_t bytes) {
+  make_current();
+  auto& r = *resources_;
+  if (bytes > r.early_bytes) {
+    resources::destroy(std::exchange(r.early, {}));
+    r.early_bytes = 0;
+    resources::make(r.early, bytes);
+    r.early_bytes = bytes;
+  }
+  if (bytes == 0) return;
+  check_cuda(cudaMemcpyAsync(r.early.bytes, src, bytes, cudaMemcpyDeviceToHost, as_stream(stream_)), "downloading");
+  check_cuda(cudaEventRecord(r.early.copied, as_stream(stream_)), "downloading");
+}
+
+void cuda_exec::end_copy_out(void* dst, std::size_t bytes) {
+  if (bytes == 0) return;
+  check_cuda(cudaEventSynchronize(resources_->early.copied), "waiting for a download");
+  std::memcpy(dst, resources_->early.bytes, bytes);
+  if (profile.enabled()) synchronize();  // the times of what came after it
 }
 
 void cuda_exec::copy(void* dst, void const* src, std::size_t bytes) {

@@ -2,6 +2,7 @@
 #include "support/policies.hpp"
 
 #include <gart/exec/buffer.hpp>
+#include <gart/exec/early_copy.hpp>
 #include <gart/exec/stage.hpp>
 
 #include <numeric>
@@ -142,6 +143,31 @@ TEST_CASE_TEMPLATE("many uploads in a row each arrive", E, GART_TEST_POLICIES) {
     buffers.emplace_back(exec, host);
   }
   for (u32 k = 0; k < 24; ++k) CHECK(buffers[k].to_host() == std::vector<u32>(host.size(), k));
+}
+
+TEST_CASE_TEMPLATE("an early copy is read after later work is queued", E, GART_TEST_POLICIES) {
+  E exec;
+  buffer<u32, E> later(exec, 1000);
+  for (std::size_t n : {3, 100000, 0, 1, 200000}) {  // larger and smaller than the room of the last
+    CAPTURE(n);
+    auto const values = numbers(n);
+    buffer<u32, E> from(exec, values);
+    std::vector<u32> read(n + 1, 9u);
+    early_copy<E> copy(exec, from.data(), n * sizeof(u32));
+    parallel_for(exec, "later", 1000, square{later});
+    copy.read(read.data());
+    CHECK(read.back() == 9u);
+    read.pop_back();
+    CHECK(read == values);
+    CHECK(later.to_host()[999] == 999u * 999u);
+  }
+  exec.profile.enable(true);
+  early_copy<E> copy(exec, later.data(), sizeof(u32));
+  parallel_for(exec, "later", 1000, square{later});
+  u32 first = 1;
+  copy.read(&first);
+  CHECK(first == 0);
+  CHECK(exec.profile.stages().at("later").launches == 1);
 }
 
 TEST_CASE_TEMPLATE("a buffer grows with slack, never shrinks, counts its bytes", E, GART_TEST_POLICIES) {

@@ -26,6 +26,7 @@
 ///       in kernels: calls f while no other thread is in a call for the same `what`. f itself makes no such call
 /// and one of a device (device_execution)
 ///   int multiprocessors();                 by which kernels that stay on the device are launched
+/// A policy whose host may run ahead of it also offers begin_copy_out and end_copy_out (exec/early_copy.hpp).
 /// copy_out waits for the data; all else is ordered on the queue. The source of copy_in may be reused on return.
 /// end_stage never throws, because it runs in a destructor.
 ///

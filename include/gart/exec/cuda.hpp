@@ -62,6 +62,11 @@ class cuda_exec {
   void copy_in(void* dst, void const* src, std::size_t bytes);
   /// To the host; waits for the data.
   void copy_out(void* dst, void const* src, std::size_t bytes);
+  ///@{
+  /// The two halves of an early_copy (exec/early_copy.hpp).
+  void begin_copy_out(void const* src, std::size_t bytes);
+  void end_copy_out(void* dst, std::size_t bytes);
+  ///@}
   /// From device to device.
   void copy(void* dst, void const* src, std::size_t bytes);
   /// Sets every byte to 0.

@@ -30,7 +30,8 @@ class session {
  public:
   /// Frees its memory of the policy.
   virtual ~session() = default;
-  /// One step of training, and its report.
+  /// One step of training, and its report. A device may still be at the end of the step: what the policy queues, and
+  /// all members here, come after that.
   virtual step_report step() = 0;
   /// Steps of this run, and of those that it resumes.
   virtual int steps_done() const = 0;

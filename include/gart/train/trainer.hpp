@@ -24,6 +24,7 @@
 
 #include <gart/backward/fallback.hpp>
 #include <gart/comm/self_comm.hpp>
+#include <gart/exec/early_copy.hpp>
 #include <gart/io/origin.hpp>
 #include <gart/io/ply.hpp>
 #include <gart/io/splat_file.hpp>

@@ -101,10 +101,14 @@ step_report basic_trainer<E, Traits, Tracer, Method, Comm>::step_on(Plan& plan, 
   for (int k = 0; k < batch; ++k) images.push_back(view_of(before, k));
   auto const row = [&](auto&& rows, int image) { return rows.subspan(static_cast<std::size_t>(image) * width, width); };
   int mine = 0;  // this rank's image of the round
-  auto const collect = [&](int first) {
-    span<float> const device = row(image_.numbers.view(), mine), host = row(span<float>(found), mine);
+  auto const send = [&] {
+    span<float> const device = row(image_.numbers.view(), mine);
     plan.finish_loss(image_, device.subspan(0, 2));
-    exec_.copy_out(host.data(), device.data(), width * sizeof(float));
+    return early_copy<E>(exec_, device.data(), width * sizeof(float));
+  };
+  auto const collect = [&](early_copy<E> sent, int first) {
+    span<float> const host = row(span<float>(found), mine);
+    sent.read(host.data());
     for (std::size_t i = 0; i < parts_.size(); ++i)
       parts_[i]->found(images[static_cast<std::size_t>(mine)], numbers_of(host, i));
     plan.collect(found, width, first);
@@ -140,7 +144,7 @@ step_report basic_trainer<E, Traits, Tracer, Method, Comm>::step_on(Plan& plan, 
                                                plan.rows(), numbers_of(row(image_.numbers.view(), done + v), i));
               });
     last = done, done += views;
-    if (done < batch) collect(last);
+    if (done < batch) collect(send(), last);
   }
   if constexpr (requires { plan.take_traffic(); }) progress_.sent += plan.take_traffic();
   progress_.step += batch;
@@ -150,9 +154,11 @@ step_report basic_trainer<E, Traits, Tracer, Method, Comm>::step_on(Plan& plan, 
                         &scaled_rates.sh_dc, &scaled_rates.sh_rest})
       *rate *= std::sqrt(static_cast<float>(batch));
   shown.end();
+  // Sent before the optimizer and read when that is queued. So the device is never idle: it is at the optimizer while
+  // the host reads, and while it queues the next step.
+  auto const sent = send();
   optimize(plan, scaled_rates, degree);
-  // Read when all is queued: a device that waits for its host to read has nothing to do.
-  collect(last);
+  collect(sent, last);
 
   report.step = progress_.step, report.gaussians = gaussians_.total;
   report.view = data_.train[images.back().index].name;
