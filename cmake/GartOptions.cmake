@@ -20,7 +20,7 @@ option(GART_VARIANTS "Configurations for the program to measure trades with: ker
 option(GART_BUILD_EXAMPLES "Build the examples" ${_with_backends})
 option(GART_BUILD_TESTS "Build the tests (doctest, Eigen)" ${_with_backends})
 option(GART_BUILD_BENCH "Build the benchmarks (Google Benchmark)" OFF)
-option(GART_GROUPED_SOURCES "Compile sources of program, files, viewer and Python module in groups; off: each alone, less to do after a change" ON)
+option(GART_GROUPED_SOURCES "Compile sources of program, runtime, files, viewer and Python module in groups; off: each alone, less to do after a change" ON)
 option(GART_SANITIZE "Address and undefined-behaviour sanitizers on all host code" OFF)
 option(GART_BUILD_FUZZ "Build the fuzzers of the readers (Clang; tests/fuzz/README.md)" OFF)
 

@@ -68,7 +68,7 @@ int run_bench(bench_arguments const& a) {
     gart::dataset const data = noise_capture(cameras[v]);
     auto const session = gart::make_session(request, options, data, &file.model);
     configuration = session->configuration();
-    // A device is still at the end of a step when the next begins.
+    // A device is still at the end of a step when the next begins: some in a row are timed, and the last waited for.
     int const steps_together = configuration.backend == gart::backend_kind::cuda ? 4 : 1;
     std::map<std::string, std::vector<double>> samples;
     std::vector<double> walls, processors;
@@ -142,7 +142,8 @@ void add_bench(CLI::App& app, command& selected) {
       ->check(one_of_methods());
   add_value(*bench, "--views", a->views, "N", "The first so many cameras")->check(between(1, 10000));
   add_value(*bench, "--warmups", a->warmups, "N", "Steps before the measured ones, each view")->check(between(0, 1000));
-  add_value(*bench, "--repeats", a->repeats, "N", "Measured steps, each view; the median counts")
+  add_value(*bench, "--repeats", a->repeats, "N",
+            "Measurements of each view, on a GPU of four steps in a row;\nthe median counts")
       ->check(between(1, 1000));
   add_open(*bench, "--json", a->json, "FILE", "Write the figures to this file");
   add_quiet(*bench, a->quiet);

@@ -66,7 +66,7 @@ class basic_trainer {
   basic_trainer(E& exec, train_options const& options, dataset const&& temporary, start_model const& start,
                 Comm comm = Comm()) = delete;
 
-  /// One step, with the loss of the options.
+  /// One step, with the loss of the options. A device may still be at its end; what is queued next comes after it.
   step_report step() { return step_by(nullptr); }
   /// One step with the caller's loss, which gets a loss_input.
   template <class Loss>
