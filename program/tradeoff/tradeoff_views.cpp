@@ -1,11 +1,10 @@
 #include "tradeoff_views.hpp"
 
 #include "choices.hpp"
+#include "loss_gradient.hpp"
 #include "output.hpp"
 
 #include <gart/core/error.hpp>
-#include <gart/exec/parallel.hpp>
-#include <gart/loss/image_loss.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -119,12 +118,7 @@ void set_color_gradient(tradeoff_view& v, gart::image_float const& image, gart::
     for (float& x : whole.data)
       x = static_cast<float>((2 * uniform(engine) - 1) / static_cast<double>(whole.data.size()));
   } else {
-    gart::openmp_exec exec;
-    gart::image_loss<gart::openmp_exec> loss(exec);
-    std::vector<float> value(2);
-    loss.evaluate(image.data,
-                  {v.truth.data.data(), v.truth.channels, v.mask.empty() ? nullptr : v.mask.data.data(), background},
-                  v.view.width, v.view.height, ssim_weight, whole.data, value);
+    whole = loss_gradient(image, v.truth, v.mask, background, ssim_weight);
   }
   v.color_gradient = gart::image_float(v.view.width, v.view.height, 3);
   for (std::size_t const p : v.pixels) std::copy_n(&whole.data[3 * p], 3, &v.color_gradient.data[3 * p]);
