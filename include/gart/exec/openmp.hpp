@@ -4,6 +4,7 @@
 
 #include <gart/exec/host_memory.hpp>
 
+#include <algorithm>
 #include <atomic>
 #if defined(_OPENMP)
 #include <omp.h>
@@ -20,6 +21,21 @@ class openmp_exec : public host_memory {
   explicit openmp_exec(int threads = 0) : threads_(threads > 0 ? threads : default_threads()) {}
   /// How many threads it runs on.
   int threads() const { return threads_; }
+
+  ///@{
+  /// As of host_memory. Large blocks are shared out among the threads: one core uses a part of the memory's bandwidth.
+  void copy_in(void* dst, void const* src, std::size_t bytes) { copy(dst, src, bytes); }
+  void copy_out(void* dst, void const* src, std::size_t bytes) { copy(dst, src, bytes); }
+  void copy(void* dst, void const* src, std::size_t bytes) {
+    in_parts(bytes, [=](std::size_t from, std::size_t n) {
+      std::memcpy(static_cast<char*>(dst) + from, static_cast<char const*>(src) + from, n);
+    });
+  }
+  void zero(void* p, std::size_t bytes) { fill(p, 0, bytes); }
+  void fill(void* p, unsigned char byte, std::size_t bytes) {
+    in_parts(bytes, [=](std::size_t from, std::size_t n) { std::memset(static_cast<char*>(p) + from, byte, n); });
+  }
+  ///@}
 
   /// Adds v, returns the old value.
   template <class T>
@@ -53,6 +69,17 @@ class openmp_exec : public host_memory {
   static void fence() { std::atomic_thread_fence(std::memory_order_seq_cst); }
 
  private:
+  // f(first, n) for parts of so many bytes, on all threads.
+  template <class F>
+  void in_parts(std::size_t bytes, F const& f) const {
+    constexpr std::size_t part = std::size_t{1} << 20;
+    [[maybe_unused]] bool const large = bytes > part;
+#if defined(_OPENMP)
+#pragma omp parallel for schedule(static) num_threads(threads_) if (large)
+#endif
+    for (std::size_t from = 0; from < bytes; from += part) f(from, std::min(part, bytes - from));
+  }
+
   static inline std::atomic_flag row_locks[4096];
   static int default_threads() {
 #if defined(_OPENMP)
