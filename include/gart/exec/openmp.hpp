@@ -73,9 +73,8 @@ class openmp_exec : public host_memory {
   template <class F>
   void in_parts(std::size_t bytes, F const& f) const {
     constexpr std::size_t part = std::size_t{1} << 20;
-    [[maybe_unused]] bool const large = bytes > part;
 #if defined(_OPENMP)
-#pragma omp parallel for schedule(static) num_threads(threads_) if (large)
+#pragma omp parallel for schedule(static) num_threads(threads_) if (bytes > part)
 #endif
     for (std::size_t from = 0; from < bytes; from += part) f(from, std::min(part, bytes - from));
   }
