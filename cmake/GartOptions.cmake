@@ -87,6 +87,11 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
                                                         $<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=${GART_ARCH_FLAG}>)
   endif()
 endif()
+# Of Release builds whose compilation costs more than it gains: the program and the tests. It changes no bit. At -O1 alone
+# g++ leaves out vzeroupper, and what libm and other libraries compute by SSE after a wide register was used takes up to 30
+# times as long.
+set(GART_LIGHT_OPTIMISATION $<$<AND:$<CONFIG:Release>,$<COMPILE_LANG_AND_ID:CXX,GNU,Clang,AppleClang>>:-O1>
+                            $<$<AND:$<CONFIG:Release>,$<COMPILE_LANG_AND_ID:CXX,GNU>>:-fexpensive-optimizations>)
 # Processors from Skylake to Cascade Lake decode branches that cross 32 bytes slowly.
 include(CheckCXXCompilerFlag)
 check_cxx_compiler_flag(-Wa,-mbranches-within-32B-boundaries GART_ALIGNS_BRANCHES)
