@@ -38,8 +38,12 @@ gart::decision<std::string> sizes_in_words(gart::dataset const& data, gart::trai
 }
 
 // The option of a setting; null for those of --set.
-std::string* option_of(train_arguments& a, std::string const& setting) {
-  return setting == "exposure" ? &a.exposure : setting == "vignetting" ? &a.vignetting : nullptr;
+template <class Arguments>
+auto* option_of(Arguments& a, std::string const& setting) {
+  return setting == "match"        ? &a.match
+         : setting == "exposure"   ? &a.exposure
+         : setting == "vignetting" ? &a.vignetting
+                                   : nullptr;
 }
 
 }  // namespace
@@ -73,10 +77,14 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
       traits.masked ? "excluded pixels count in no loss" : "the capture has none");
 
   if (a.start.empty()) {
+    auto const match = gart::choose_match(traits);
+    if (traits.points == 0) settle("--match", a.match, {match.value ? "on" : "off", match.why});
     auto const start = gart::choose_start(data, train_options_of(a));
     say("start", with_commas(start.value.count),
         start.value.measured                      ? "the capture has no points: of its depth maps"
         : start.value.random                      ? "the capture has no points: random ones"
+        : start.value.matched && traits.points    ? "the capture's points, and those matched in its photographs"
+        : start.value.matched                     ? "points matched in the photographs"
         : start.value.count == data.points.size() ? "the capture's points"
                                                   : "a random subset of the capture's points");
     say("--init-opacity", gart::short_number(start.value.opacity),
@@ -96,16 +104,30 @@ nlohmann::json chosen_before(nlohmann::json const& config, nlohmann::json const&
   return *found;
 }
 
-nlohmann::json measure(train_arguments a, gart::dataset const& data, gart::validation_progress const& progress) {
-  gart::train_options const options = train_options_of(a);
-  std::vector<gart::candidate> candidates;
-  if (a.automatic) candidates = gart::default_candidates(gart::inspect(data), options);
-  std::erase_if(candidates, [&](gart::candidate const& c) {
+namespace {
+
+std::vector<gart::candidate> candidates_of(train_arguments const& a, gart::dataset const& data) {
+  std::vector<gart::candidate> all;
+  if (a.automatic) all = gart::default_candidates(gart::inspect(data), train_options_of(a));
+  std::erase_if(all, [&](gart::candidate const& c) {
     if (c.shortens) return a.length_given;
     std::string const* const own = option_of(a, c.setting);
     return own ? *own != "auto" : a.set.has(c.setting);
   });
-  gart::validation const found = gart::validate(configuration_request_of(a), options, data, candidates, progress);
+  return all;
+}
+
+}  // namespace
+
+bool has_trials(train_arguments const& a, gart::dataset const& data) {
+  bool const beside = gart::resolve(configuration_request_of(a)).backend == gart::backend_kind::cuda;
+  return gart::plan_validation(train_options_of(a), data, candidates_of(a, data), beside).tried > 0;
+}
+
+nlohmann::json measure(train_arguments a, gart::dataset const& data, gart::validation_progress const& progress) {
+  gart::train_options const options = train_options_of(a);
+  gart::validation const found =
+      gart::validate(configuration_request_of(a), options, data, candidates_of(a, data), progress);
   nlohmann::json trials = nlohmann::json::array();
   for (gart::trial const& t : found.trials)
     trials.push_back({{"setting", t.setting},
@@ -145,7 +167,8 @@ void settle(train_arguments& a, gart::dataset const& data, nlohmann::json const&
             (t["taken"] && gain <= 0 ? "; a trial shows it worse than a whole run" : ""));
   }
   // Settings that were not measured keep the usual values.
-  for (auto const& [own, given] : {std::pair{&a.exposure, "off"}, {&a.vignetting, "off"}, {&a.densify, "error"}})
+  for (auto const& [own, given] :
+       {std::pair{&a.match, "off"}, {&a.exposure, "off"}, {&a.vignetting, "off"}, {&a.densify, "error"}})
     if (*own == "auto") *own = given;
 
   gart::train_options const options = train_options_of(a);

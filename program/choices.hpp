@@ -22,6 +22,8 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data);
 // The choices of a resumed run, from its config.json; `now` where that does not say.
 nlohmann::json chosen_before(nlohmann::json const& config, nlohmann::json const& now);
 
+// Whether settings are left to try, in a run that is long enough.
+bool has_trials(train_arguments const& a, gart::dataset const& data);
 // Tries settings that the command line leaves open in short trainings (gart/runtime/validation.hpp); returns how, and
 // each trial.
 nlohmann::json measure(train_arguments a, gart::dataset const& data, gart::validation_progress const& progress);

@@ -16,6 +16,7 @@ std::vector<field_name> const& field_names() {
   static std::vector<field_name> const names = {
       {GART_CLI_FIELD(train_options, densify), "--densify"},
       {GART_CLI_FIELD(train_options, background), "--background"},
+      {GART_CLI_FIELD(train_options, match), "--match"},
       {GART_CLI_FIELD(train_options, exposure), "--exposure"},
       {GART_CLI_FIELD(train_options, vignetting), "--vignetting"},
       {GART_CLI_FIELD(train_options, hit_memory), "--hit-memory"},

@@ -10,6 +10,7 @@
 #include <gart/runtime/evaluate.hpp>
 #include <gart/runtime/initial.hpp>
 #include <gart/runtime/instances.hpp>
+#include <gart/runtime/matched_points.hpp>
 #include <gart/runtime/model_file.hpp>
 #include <gart/runtime/path_renderer.hpp>
 #include <gart/runtime/renderer.hpp>

@@ -112,6 +112,10 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       "farther away\nthan they were trained. The model's file says so"));
 
   group = "Capture";
+  in_group(r.add(train, "--match", a.match, "NAME",
+                 "on: start from points matched in the photographs too;\nauto: where the capture has no points, or "
+                 "where --auto\nmeasures a gain"))
+      ->check(one_of({"auto", "on", "off"}));
   in_group(r.add(train, "--exposure", a.exposure, "NAME",
                  "on: learn the exposure and white balance of each photograph;\ntest views get theirs from the "
                  "training views about them.\nauto: where --auto measures a gain"))
@@ -276,7 +280,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   gart::train_options o = a.options;
   o.random_points = std::min(o.random_points, o.max_gaussians);
   o.densify = gart::from_string(a.densify, o.densify);
-  o.exposure = a.exposure == "on", o.vignetting = a.vignetting == "on";
+  o.match = a.match == "on", o.exposure = a.exposure == "on", o.vignetting = a.vignetting == "on";
   o.adam.sparse = a.adam == "seen";
   o.hit_memory = static_cast<gart::u64>(a.hit_memory_gb * 1e9);
   // Until it is settled it decides nothing.

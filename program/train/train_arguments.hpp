@@ -50,7 +50,7 @@ struct train_arguments {
   bool no_masks = false;
   std::string depth_kind = "auto";
   double depth_unit = 0;
-  std::string exposure = "auto", vignetting = "auto", adam = "all";
+  std::string match = "auto", exposure = "auto", vignetting = "auto", adam = "all";
   field_values set;
   bool antialias = false;
   double hit_memory_gb = 0;

@@ -174,7 +174,7 @@ nlohmann::json training_run::metrics_of(gart::scores const& result, gart::scores
   m["psnr_over_seconds"] = course_.psnr_over_seconds();
   m["image_size"] = image_size(), m["notes"] = data_.notes;
   m["background"] = a_.background == "random" ? "random in training, black in testing" : a_.background;
-  m["exposure"] = a_.exposure == "on", m["vignetting"] = a_.vignetting == "on",
+  m["match"] = a_.match == "on", m["exposure"] = a_.exposure == "on", m["vignetting"] = a_.vignetting == "on",
   m["refine_poses"] = a_.options.refine_poses;
   m["refine_lens"] = a_.options.refine_lens;
   m["iterations"] = session_->steps_done(), m["time_budget"] = a_.time_budget, m["raised"] = raised_;

@@ -7,6 +7,7 @@
 
 #include <gart/io/placed_views.hpp>
 #include <gart/io/scene_file.hpp>
+#include <gart/runtime/matched_points.hpp>
 #include <gart/runtime/model_file.hpp>
 #include <gart/train/memory_need.hpp>
 
@@ -49,6 +50,7 @@ void training_run::prepare() {
   check_poses();
   configuration_ = gart::resolve(request());  // a missing file is known before images are read
   load();
+  match_photographs();
   chosen_ = choose(a_, data_);
   configuration_ = gart::resolve(request());
   a_.backend = to_string(configuration_.backend), a_.tracer = to_string(configuration_.tracer),
@@ -164,7 +166,7 @@ void training_run::measure_capture() {
   }
   measured_ = nlohmann::json::parse(ranks::agreed_text(measured_.dump()));
   settle(a_, data_, measured_, chosen_);
-  measure_seconds_ = measuring.seconds();
+  measure_seconds_ += measuring.seconds();
 }
 
 void training_run::say_choices() {
@@ -209,6 +211,19 @@ void training_run::load() {
             std::to_string(data_.test.size()) + " test views (" + data_.split + "), " + image_size() + ", " +
             with_commas(data_.points.size()) + " points");
   for (auto const& note : data_.notes) say_.note("  " + note);
+}
+
+// Starting points, where the capture has none, or where trials tell whether they pay beside its own.
+void training_run::match_photographs() {
+  bool const none = data_.points.size() == 0 && a_.options.depth_weight == 0;
+  bool const wanted = a_.match == "on" || (a_.match == "auto" && (none || has_trials(a_, data_)));
+  if (a_.resume || !a_.start.empty() || !wanted) return;
+  stopwatch const matching;
+  data_.matched = gart::match_photographs(data_, a_.options.random_points, a_.options.seed,
+                                          [&](double done) { say_.state("matching photographs", done); });
+  measure_seconds_ = matching.seconds();
+  say_.note("  " + with_commas(data_.matched.size()) + " points matched in the photographs, in " +
+            as_duration(measure_seconds_));
 }
 
 // The first checkpoint is written before the first step: what cannot be saved is then known before it costs anything.

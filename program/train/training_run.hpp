@@ -56,6 +56,7 @@ class training_run {
   void measure_capture();
   void enter();
   void load();
+  void match_photographs();
   void begin_anew();
   void go_on();
 

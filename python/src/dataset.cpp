@@ -2,6 +2,7 @@
 #include "bindings.hpp"
 
 #include <gart/io/extent.hpp>
+#include <gart/runtime/matched_points.hpp>
 
 #include <algorithm>
 
@@ -166,6 +167,17 @@ colors       uint8 [N, 3])")
             return shown_array({static_cast<std::int64_t>(p.size()), 3}, p.color.data(), s);
           },
           "uint8 [N, 3]")
+      .def(
+          "match_photographs",
+          [](gart::dataset& d, gart::index_t pixels, gart::u64 seed) {
+            py::gil_scoped_release released;
+            d.matched = gart::match_photographs(d, pixels, seed);
+            return d.matched.size();
+          },
+          py::arg("pixels") = 100000, py::arg("seed") = 1,
+          R"(Finds points on surfaces by matching the training photographs; returns how many.
+
+recommended() then starts from them where the dataset has no points, or where it measures that they pay.)")
       .def("__repr__", [](gart::dataset const& d) {
         return "gart.Dataset(" + d.format + ", " + std::to_string(d.train.size()) + " training views, " +
                std::to_string(d.test.size()) + " test views)";

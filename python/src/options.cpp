@@ -176,6 +176,7 @@ options.rates.opacity = 0.05.)");
   named_field(c, "densify", &train::densify, "error, mcmc, adc or none: how the number of Gaussians grows");
   named_field(c, "background", &train::background, "white, black or random: what is behind the scene");
   c.def_rw("exposure", &train::exposure, "learn an exposure of each training view");
+  c.def_rw("match", &train::match, "start from the points of match_photographs too");
   c.def_rw("vignetting", &train::vignetting, "learn the falloff of each lens");
 }
 

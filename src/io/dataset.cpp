@@ -171,7 +171,7 @@ void measure_bounds(dataset& data) {
   }
   data.bounds_min = center - vec3d(radius), data.bounds_max = center + vec3d(radius);
   if (data.points.size() == 0) {
-    data.notes.push_back(std::string("no starting points: random ones fill a box of half width ") +
+    data.notes.push_back(std::string("no starting points; random ones would fill a box of half width ") +
                          std::to_string(radius) +
                          (looks_inwards ? " around the point the cameras look at" : " in front of the cameras"));
   }

@@ -16,6 +16,7 @@ constexpr std::size_t most_images = 64;
 constexpr int plain_levels = 12;      // of 255
 constexpr double plain_share = 0.95;  // of the border's pixels
 constexpr int white_from = 230, black_to = 25;
+constexpr std::size_t fewest_matched = 1000;
 
 std::string percent(double share) {
   char text[32];
@@ -78,6 +79,7 @@ bool one_to_one(camera const& view) {
 capture_traits inspect(dataset const& data) {
   capture_traits traits;
   traits.views = data.train.size(), traits.pixels = data.training_pixels();
+  traits.points = data.points.size(), traits.matched = data.matched.size();
   for (auto const* views : {&data.train, &data.test}) {
     for (dataset_view const& v : *views) {
       if (v.view.kind == camera_kind::perspective && !v.view.lens.any()) continue;
@@ -124,17 +126,26 @@ decision<std::string> choose_backward(capture_traits const& t) {
   return {"auto", "the fastest there is"};
 }
 
+decision<bool> choose_match(capture_traits const& t) {
+  if (t.points) return {false, "the capture has points"};
+  if (t.matched >= fewest_matched) return {true, "the capture has no points"};
+  return {false, t.matched ? "too few were found: " + std::to_string(t.matched) : "photographs were not matched"};
+}
+
 decision<starting_points> choose_start(dataset const& data, train_options const& options) {
   starting_points start;
   bool const mapped = options.depth_weight > 0 && std::any_of(data.train.begin(), data.train.end(),
                                                               [](dataset_view const& v) { return !v.depth.empty(); });
-  start.measured = data.points.size() == 0 && mapped, start.random = data.points.size() == 0 && !mapped;
+  start.matched = options.match && data.matched.size() > 0;
+  std::size_t const given = data.points.size() + (start.matched ? data.matched.size() : 0);
+  start.measured = given == 0 && mapped, start.random = given == 0 && !mapped;
   bool const sparse = start.random && (options.densify == densify_kind::error || options.densify == densify_kind::mcmc);
-  std::size_t const points = start.random || start.measured ? options.random_points : data.points.size();
+  std::size_t const points = given == 0 ? options.random_points : given;
   start.count = static_cast<index_t>(std::min<std::size_t>(points, options.max_gaussians));
   start.opacity = options.initial_opacity != 0 ? options.initial_opacity : sparse ? 0.5f : 0.1f;
   start.scale = options.initial_scale != 0 ? options.initial_scale : sparse ? 0.1f : 1.0f;
   return {start, start.measured  ? "what depth maps measured lies on surfaces"
+                 : start.matched ? "points matched in photographs lie on surfaces"
                  : !start.random ? "the capture's points lie on surfaces"
                  : sparse        ? "random points are mostly in empty space, and the dead move"
                                  : "random points"};
@@ -162,8 +173,9 @@ recommendation recommended(train_options const& options, dataset const& data, co
   if (request.tracer == tracer_kind::automatic) all.request.tracer = choose_tracer(traits).value;
   if (request.backward == "auto") all.request.backward = choose_backward(traits).value;
   if (!is_given("background")) all.options.background = choose_background(traits).value;
+  if (!is_given("match")) all.options.match = choose_match(traits).value;
   std::vector<candidate> candidates;
-  for (candidate& c : default_candidates(traits, options))
+  for (candidate& c : default_candidates(traits, all.options))
     if (!is_given(c.setting) && !(c.shortens && length_given)) candidates.push_back(std::move(c));
   all.measured = validate(all.request, all.options, data, candidates, progress);
   all.options = all.measured.options;

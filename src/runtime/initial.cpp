@@ -169,6 +169,10 @@ gaussian_model initial_model(dataset const& data, train_options const& options, 
   point_cloud points = start.measured ? points_of_maps(data, start.count, options.seed, options.held_out)
                        : start.random ? random_points(data.bounds_min, data.bounds_max, start.count, options.seed)
                                       : data.points;
+  if (start.matched) {
+    points.position.insert(points.position.end(), data.matched.position.begin(), data.matched.position.end());
+    points.color.insert(points.color.end(), data.matched.color.begin(), data.matched.color.end());
+  }
   if (start.measured && points.size() == 0)
     throw invalid_argument(
         "train_options.depth_weight: no depth map has a distance where its photograph is opaque and not masked "

@@ -93,6 +93,16 @@ struct trial_progress {
   }
 };
 
+// Each n-th point.
+point_cloud thinned(point_cloud const& all, std::size_t n) {
+  point_cloud some;
+  for (std::size_t i = 0; i < all.size(); i += n) {
+    for (std::size_t k = 3 * i; k < 3 * i + 3; ++k)
+      some.position.push_back(all.position[k]), some.color.push_back(all.color[k]);
+  }
+  return some;
+}
+
 // Calls run(i, go_on) for each of `count` trials, in turn or in parallel threads. A call of go_on() counts a step, and
 // returns false once the caller has ended the measurement.
 template <class Run>
@@ -219,6 +229,7 @@ class trial_round {
 std::vector<candidate> default_candidates(capture_traits const& traits, train_options const& options) {
   std::vector<candidate> all;
   all.push_back({"exposure", "on", [](train_options& o) { o.exposure = true; }, -2});
+  if (traits.matched > 0 && !options.match) all.push_back({"match", "on", [](train_options& o) { o.match = true; }});
   if (!traits.panoramas) all.push_back({"vignetting", "on", [](train_options& o) { o.vignetting = true; }});
   all.push_back({"rates.sh_rest", "0.000125", [](train_options& o) { o.rates.sh_rest = 0.000125f; }});
   error_growth_options more = options.error;
@@ -240,6 +251,7 @@ std::vector<candidate> default_candidates(capture_traits const& traits, train_op
 dataset shrunk(dataset const& data, int shrink) {
   dataset small;
   small.format = data.format, small.split = data.split, small.points = data.points;
+  small.matched = thinned(data.matched, static_cast<std::size_t>(shrink * shrink));
   small.extent = data.extent, small.alpha = data.alpha;
   small.origin = data.origin, small.bounds_min = data.bounds_min, small.bounds_max = data.bounds_max;
   small.train.resize(data.train.size());

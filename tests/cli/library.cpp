@@ -159,7 +159,8 @@ TEST_CASE("a run whose length nobody gives is as long as its trials say") {
   write_capture(here / "capture", 24);
   fill_images(here / "capture", false);
   std::string const run =
-      "train capture --exposure off --vignetting off --set rates.sh_rest=1e-3,error.draw_by_root=1 --max-gaussians 30 "
+      "train capture --match off --exposure off --vignetting off --set rates.sh_rest=1e-3,error.draw_by_root=1 "
+      "--max-gaussians 30 "
       "--backend serial --stop-at 1 --out run ";
   auto const config_of = [&](std::string const& more) {
     auto const made = here.gart(run + more);
@@ -176,6 +177,27 @@ TEST_CASE("a run whose length nobody gives is as long as its trials say") {
     CAPTURE(given);
     CHECK(config_of(given)["measured"]["trials"].empty());
   }
+}
+
+TEST_CASE("photographs are matched where a capture has no points") {
+  folder const here;
+  write_capture(here / "capture");
+  fs::remove(here / "capture/points3d.ply");
+  std::string const run = "train capture --out run --iterations 2 --points 50 --backend serial ";
+  auto const said = [&](std::string const& more) {
+    auto const made = here.gart(run + more);
+    REQUIRE_MESSAGE(made.code == 0, made.err);
+    return made.out + made.err;
+  };
+  // They have 16 x 16 pixels, too few to be told apart.
+  std::string const by_itself = said("");
+  CHECK(has(by_itself, "points matched in the photographs, in "));
+  CHECK(has(by_itself, "--match off: "));
+  CHECK(has(by_itself, "start 50: the capture has no points: random ones"));
+  CHECK(here.json("run/config.json")["options"]["match"] == "off");
+  CHECK(here.json("run/metrics.json")["match"] == false);
+  CHECK(!has(said("--match off"), "points matched"));
+  CHECK(here.gart(run + "--match perhaps").code == 2);
 }
 
 TEST_CASE("a run from before the penalty on bands keeps its rates") {

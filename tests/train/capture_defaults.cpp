@@ -129,6 +129,42 @@ TEST_CASE("training starts from the capture's points or random ones") {
   CHECK(start.count == 4);
 }
 
+TEST_CASE("training starts from matched points where asked to, and where a capture has none") {
+  auto data = capture(3, 90);
+  gart::train_options options;
+  options.random_points = 500;
+  CHECK_FALSE(gart::choose_match(gart::inspect(data)).value);
+  data.matched.position.assign(3 * 999, 1.0f), data.matched.color.assign(3 * 999, 7);
+  CHECK_FALSE(gart::choose_match(gart::inspect(data)).value);
+  CHECK(gart::choose_match(gart::inspect(data)).why == "too few were found: 999");
+  CHECK(gart::choose_start(data, options).value.random);
+  data.matched.position.resize(3 * 1000, 1.0f), data.matched.color.resize(3 * 1000, 7);
+  CHECK(gart::choose_match(gart::inspect(data)).value);
+  options.match = true;
+  auto start = gart::choose_start(data, options).value;
+  CHECK(start.matched);
+  CHECK_FALSE(start.random);
+  CHECK(start.count == 1000);
+  CHECK(start.opacity == 0.1f);
+  CHECK(gart::initial_model(data, options, 0).mean == data.matched.position);
+  // Beside a capture's own points trials tell.
+  data.points.position.assign(30, 2.0f), data.points.color.assign(30, 0);
+  auto const traits = gart::inspect(data);
+  CHECK_FALSE(gart::choose_match(traits).value);
+  auto const offered = [&] {
+    auto const all = gart::default_candidates(traits, options);
+    return std::any_of(all.begin(), all.end(), [](gart::candidate const& c) { return c.setting == "match"; });
+  };
+  CHECK_FALSE(offered());
+  CHECK(gart::initial_model(data, options, 0).size() == 1010);
+  options.match = false;
+  CHECK(offered());
+  CHECK(gart::initial_model(data, options, 0).size() == 10);
+  // A trial has as many of them a pixel as the run.
+  CHECK(gart::shrunk(data, 3).matched.size() == 112);
+  CHECK(gart::shrunk(data, 3).points.size() == 10);
+}
+
 TEST_CASE("training on depth starts from what the maps measured") {
   // A pinhole at the origin and one beside it look at the plane z = 3, of which the left half is measured.
   gart::dataset data;

@@ -52,7 +52,8 @@ struct dataset {
   std::string split;                      ///< how train and test were told apart, in words
   std::string resize_filter;              ///< "none", or "box (1/4)"
   std::vector<dataset_view> train, test;  ///< views to learn from, and views to score
-  point_cloud points;                     ///< empty: start at random
+  point_cloud points;                     ///< of the files; empty: they have none
+  point_cloud matched;                    ///< by match_photographs (runtime/matched_points.hpp); empty: not asked for
   std::vector<std::string> notes;         ///< one line each: what was skipped, scaled or assumed
   vec3d origin{0.0};                      ///< what cameras and points are from, in the capture's coordinates
   float extent = 1;                       ///< 1.1 x the largest distance of a training camera from their mean

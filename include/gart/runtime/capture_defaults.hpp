@@ -29,6 +29,8 @@ struct capture_traits {
   u8 border[3] = {0, 0, 0};   ///< the colour of a plain border
   std::size_t views = 0;      ///< training views
   u64 pixels = 0;             ///< pixels of all training views
+  std::size_t points = 0;     ///< of the capture's files
+  std::size_t matched = 0;    ///< points matched in the photographs
 
   /// Whether the objects stand before a background that does not belong to the scene.
   bool bounded() const { return clear_border || plain_border; }
@@ -53,13 +55,20 @@ decision<tracer_kind> choose_tracer(capture_traits const& traits);
 /// The method for choose_tracer's tracer.
 decision<std::string> choose_backward(capture_traits const& traits);
 
-/// The capture's points. Without points, those that depth maps measured where depth is trained on. Else random ones in
-/// the capture's bounds. A capture's points lie on surfaces. Opacity 0.1 and a scale of 1.0 (times the distance to the
-/// neighbours) fill the gaps between them. Random points mostly lie in empty space. With MCMC, which moves them, 0.5
-/// and 0.1 let rays through from the first step. Values that the options give stay.
+/// Whether to start from points matched in the photographs (dataset::matched): where the capture has no points, and at
+/// least 1,000 were matched. Fewer leave most of a scene empty. Where a capture has points, trials tell
+/// (default_candidates).
+decision<bool> choose_match(capture_traits const& traits);
+
+/// The capture's points, and with options.match those matched in its photographs. Without any, those that depth maps
+/// measured where depth is trained on. Else random ones in the capture's bounds. Points of the first three kinds lie on
+/// surfaces. Opacity 0.1 and a scale of 1.0 (times the distance to the neighbours) fill the gaps between them. Random
+/// points mostly lie in empty space. With MCMC, which moves them, 0.5 and 0.1 let rays through from the first step.
+/// Values that the options give stay.
 struct starting_points {
   bool random = false;    ///< in the capture's bounds
-  bool measured = false;  ///< measured by depth maps; neither: the capture's own
+  bool measured = false;  ///< measured by depth maps; neither: the capture's own, or
+  bool matched = false;   ///< those matched in the photographs, beside the capture's own
   index_t count = 0;      ///< of points
   float opacity = 0,      ///< of the first Gaussians
       scale = 0;          ///< times the distance to the neighbours
@@ -76,8 +85,9 @@ struct recommendation {
   train_options options;          ///< options with the choices
   validation measured;            ///< the trials behind them
 };
-/// Fills in what `request` leaves open, the background, and the default candidates. Settings named in `given` stay as
-/// they are, and so does a number of iterations other than the usual. Cost: O(pixels), and the trials.
+/// Fills in what `request` leaves open, the background, the points to start from, and the default candidates. Settings
+/// named in `given` stay as they are, and so does a number of iterations other than the usual. Cost: O(pixels), and the
+/// trials.
 recommendation recommended(train_options const& options, dataset const& data, configuration_request const& request = {},
                            std::vector<std::string> const& given = {}, validation_progress const& progress = {});
 

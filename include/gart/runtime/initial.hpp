@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// The first Gaussians of a training, from points. These are the capture's, those that depth maps measured, or random
-/// ones in a box. Log-scale = ln sqrt(max(mean squared distance to the 3 nearest neighbours, least_distance^2)); the
-/// rotation is the identity. The constant band has the colour. Each channel is at least half a step of 8 bits, since a
-/// colour of 0 has no gradient.
+/// The first Gaussians of a training, from points. These are the capture's, those matched in its photographs, those
+/// that depth maps measured, or random ones in a box. Log-scale = ln sqrt(max(mean squared distance to the 3 nearest
+/// neighbours, least_distance^2)); the rotation is the identity. The constant band has the colour. Each channel is at
+/// least half a step of 8 bits, since a colour of 0 has no gradient.
 
 #include <gart/io/dataset.hpp>
 #include <gart/scene/gaussians.hpp>

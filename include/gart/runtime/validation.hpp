@@ -104,7 +104,8 @@ using validation_progress = std::function<bool(double done, std::string const& p
 validation validate(configuration_request const& request, train_options const& options, dataset const& data,
                     std::vector<candidate> const& candidates, validation_progress const& progress = {});
 
-/// The capture for trials: the training views, shrunk, and the same points.
+/// The capture for trials: the training views, shrunk, and the same points. Of matched ones as many a pixel, so that a
+/// trial has no more of a start than the run.
 dataset shrunk(dataset const& data, int shrink);
 
 }  // namespace gart

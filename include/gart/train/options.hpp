@@ -44,7 +44,7 @@ struct resolution_options {
 struct train_options {
   int iterations = 30000;                      ///< steps of the run
   index_t max_gaussians = 1'000'000;           ///< never more than these
-  index_t random_points = 100'000;             ///< where the capture has no points
+  index_t random_points = 100'000;             ///< where there are no points to start from
   densify_kind densify = densify_kind::error;  ///< how their number grows
   /// Weight in the loss of the halved square of the bands above the first, its mean over the Gaussians
   /// (optim/adam.hpp). Rates of bands can then be eight times those of 3DGS without noise.
@@ -61,6 +61,7 @@ struct train_options {
   /// Weight of the depth loss, in units of the scene's extent (loss/depth_loss.hpp); 0: depth is not used. The dataset
   /// must have maps (dataset_options.depth).
   float depth_weight = 0;
+  bool match = false;         ///< start from dataset::matched too (runtime/matched_points.hpp)
   bool exposure = false;      ///< learn an exposure of each training view (exposure/exposure.hpp)
   bool vignetting = false;    ///< learn the falloff of each lens (exposure/vignetting.hpp)
   bool refine_poses = false;  ///< learn the pose of each training view (pose/pose_training.hpp)
