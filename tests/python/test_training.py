@@ -40,6 +40,17 @@ class Training(unittest.TestCase):
     def setUpClass(cls):
         cls.data = capture()
 
+    def test_matched_photographs_are_for_sessions_to_start_from(self):
+        # Few views of few pixels: what is found depends on them, and is the same again.
+        data = capture(views=16, size=96)
+        found = data.match_photographs(4000)
+        self.assertEqual(found, data.match_photographs(pixels=4000, seed=1))
+        self.assertGreater(found, 10)
+        options = gart.TrainOptions(**OPTIONS)
+        self.assertFalse(options.match)
+        options.match = True
+        self.assertEqual(len(gart.Session(data, options, backend="openmp", sh_degree=0)), 60 + found)
+
     def test_a_session_learns_views_of_arrays(self):
         options = gart.TrainOptions(**OPTIONS)
         session = gart.Session(self.data, options, backend="openmp", sh_degree=0)
