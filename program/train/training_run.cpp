@@ -215,9 +215,9 @@ void training_run::load() {
 
 // Starting points, where the capture has none, or where trials tell whether they pay beside its own.
 void training_run::match_photographs() {
+  if (a_.resume || !a_.start.empty() || a_.match == "off") return;
   bool const none = data_.points.size() == 0 && a_.options.depth_weight == 0;
-  bool const wanted = a_.match == "on" || (a_.match == "auto" && (none || has_trials(a_, data_)));
-  if (a_.resume || !a_.start.empty() || !wanted) return;
+  if (a_.match == "auto" && !none && !has_trials(a_, data_)) return;
   stopwatch const matching;
   data_.matched = gart::match_photographs(data_, a_.options.random_points, a_.options.seed,
                                           [&](double done) { say_.state("matching photographs", done); });

@@ -231,13 +231,13 @@ std::vector<candidate> default_candidates(capture_traits const& traits, train_op
   all.push_back({"exposure", "on", [](train_options& o) { o.exposure = true; }, -2});
   if (traits.matched > 0 && !options.match) all.push_back({"match", "on", [](train_options& o) { o.match = true; }});
   if (!traits.panoramas) all.push_back({"vignetting", "on", [](train_options& o) { o.vignetting = true; }});
-  all.push_back({"rates.sh_rest", "0.000125", [](train_options& o) { o.rates.sh_rest = 0.000125f; }});
   error_growth_options more = options.error;
   more.pixels_per_gaussian = 100;
   index_t const most = options.max_gaussians;
   if (options.densify == densify_kind::error &&
       growth_budget(more, most, traits.pixels) > growth_budget(options.error, most, traits.pixels))
     all.push_back({"error.pixels_per_gaussian", "100", [](train_options& o) { o.error.pixels_per_gaussian = 100; }});
+  all.push_back({"rates.sh_rest", "0.000125", [](train_options& o) { o.rates.sh_rest = 0.000125f; }});
   if (options.densify == densify_kind::error)
     all.push_back({"error.draw_by_root", "0", [](train_options& o) { o.error.draw_by_root = false; }});
   // Poses, lenses and depth take steps too, and trials have none of them.
