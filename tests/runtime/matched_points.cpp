@@ -31,14 +31,15 @@ gart::vec3 textured(double x, double y) {
 }
 
 // The slope z = 4 + 0.3 x.
-gart::dataset photographs_of(gart::vec3 (*color)(double, double), int views, gart::distortion const& lens = {}) {
+gart::dataset photographs_of(gart::vec3 (*color)(double, double), int views, gart::distortion const& lens = {},
+                             double spread = 1) {
   gart::dataset data;
   data.extent = 1.1f;
   for (int i = 0; i < views; ++i) {
     gart::dataset_view v;
     gart::camera& c = v.view;
     c.width = 160, c.height = 120, c.fx = 150, c.fy = 140, c.cx = 81, c.cy = 59, c.lens = lens;
-    c.position = {-1 + 2.0 * (i % 4) / 3, 0.4 * (i / 4) - 0.4, 0.05 * i};
+    c.position = gart::vec3d(-1 + 2.0 * (i % 4) / 3, 0.4 * (i / 4) - 0.4, 0.05 * i) * spread;
     float const turn = -0.2f * static_cast<float>(c.position.x);
     c.rotation = gart::mat3(std::cos(turn), 0, -std::sin(turn), 0, 1, 0, std::sin(turn), 0, std::cos(turn));
     v.image = gart::image8(c.width, c.height, 3);
@@ -110,6 +111,8 @@ TEST_CASE("matched points are the same on any number of threads") {
 TEST_CASE("no points where photographs do not tell depth") {
   auto const plain = [](double, double) { return gart::vec3(0.5f); };
   CHECK(gart::match_photographs(photographs_of(plain, 12), 1000, 1).size() == 0);
+  // Rays meet at less than a degree.
+  CHECK(gart::match_photographs(photographs_of(textured, 12, {}, 0.04), 1000, 1).size() == 0);
   auto few = photographs_of(textured, 3);
   CHECK(gart::match_photographs(few, 1000, 1).size() == 0);
   CHECK(gart::match_photographs({}, 1000, 1).size() == 0);
