@@ -213,11 +213,11 @@ void training_run::load() {
   for (auto const& note : data_.notes) say_.note("  " + note);
 }
 
-// Starting points, where the capture has none, or where trials tell whether they pay beside its own.
+// Starting points, where neither the capture nor its depth maps have any, or where trials tell whether they pay.
 void training_run::match_photographs() {
   if (a_.resume || !a_.start.empty() || a_.match == "off") return;
-  bool const none = data_.points.size() == 0 && a_.options.depth_weight == 0;
-  if (a_.match == "auto" && !none && !has_trials(a_, data_)) return;
+  bool const pays = data_.points.size() > 0 ? has_trials(a_, data_) : a_.options.depth_weight == 0;
+  if (a_.match == "auto" && !pays) return;
   stopwatch const matching;
   data_.matched = gart::match_photographs(data_, a_.options.random_points, a_.options.seed,
                                           [&](double done) { say_.state("matching photographs", done); });

@@ -55,6 +55,20 @@ TEST_CASE("train uses depth maps on request and says what is missing") {
   CHECK(kind.code == 2);
 }
 
+TEST_CASE("depth maps go before matched photographs, also where there are trials") {
+  folder const here;
+  write_capture(here / "capture", 24);
+  add_maps(here / "capture", 24);
+  fs::remove(here / "capture/points3d.ply");
+  auto const made = here.gart(
+      "train capture --out run --depth-weight 1 --points 30 --max-gaussians 30 --iterations 21000 --stop-at 1 "
+      "--backend openmp --exposure off --vignetting off");
+  REQUIRE_MESSAGE(made.code == 130, made.err);
+  CHECK(!here.json("run/config.json")["measured"]["trials"].empty());
+  CHECK(has(made.out + made.err, "of its depth maps"));
+  CHECK(!has(made.out + made.err, "points matched"));
+}
+
 TEST_CASE("render writes the images it is asked for") {
   folder const here;
   gart::write_splat_ply(here / "model.ply", one_gaussian());
