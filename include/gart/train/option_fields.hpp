@@ -52,7 +52,7 @@ inline constexpr option_field option_fields[] = {
      "where that is\nless (and over 100,000)"},
     {GART_FIELD(random_points), 1, 2147483647.0, "Training",
      "Gaussians to start with where the capture has no points: at\nrandom, or where its depth maps are trained on, of "
-     "these; and\npixels of the photographs that --match looks at"},
+     "these; and\npixels of the photographs that are matched"},
     {GART_FIELD(initial_opacity), 0, 0.99, "Training",
      "Opacity of the first Gaussians, below 1; 0: 0.5 for random\npoints with error or mcmc, else 0.1"},
     {GART_FIELD(initial_scale), 0, 100, "Training",
