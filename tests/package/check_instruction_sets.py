@@ -15,7 +15,8 @@ The other libraries are compiled at -O0: nothing is inlined, so more names are s
 
 Values are compared where a program happens to have them. So the objects for none and for native at -O0, which inlines
 nothing, are also searched for symbols that both have: none may have come out with a fused multiply-add, or with lanes.
-Copies of a structure may: whatever register they go through, they move the same bytes.
+Copies of a structure may: whatever register they go through, they move the same bytes. An optimised library would also
+be slow if the linker took its templates from an object at -O0: all names of that object say that it is not optimised.
 """
 import argparse
 import concurrent.futures
@@ -67,13 +68,15 @@ def values(program):
     return {what: (float(total), bits) for what, total, bits in lines}
 
 
+def symbols(path):
+    """Of what a linker takes from one object for all."""
+    told = subprocess.run(["nm", "--defined-only", path], capture_output=True, text=True, check=True).stdout
+    return {name for _, kind, name in (line.split(maxsplit=2) for line in told.splitlines()) if kind in "WVu"}
+
+
 def shared_code(one, other, program):
     """Functions that a linker takes of one object or of the other, in whose code the instruction set shows. The program is
     of the other: objdump takes a second for it, and minutes for an object of thousands of sections."""
-    def symbols(path):
-        told = subprocess.run(["nm", "--defined-only", path], capture_output=True, text=True, check=True).stdout
-        return {name for _, kind, name in (line.split(maxsplit=2) for line in told.splitlines()) if kind in "WVu"}
-
     shared, found, name = symbols(one) & symbols(other), set(), None
     if not shared:
         sys.exit(f"{one} and {other} share nothing: they should share standard templates at least")
@@ -128,6 +131,8 @@ with tempfile.TemporaryDirectory() as temporary:
     in_objects = {o: binary / "CMakeFiles" / f"templates_{o}_O0.dir" / "templates.cpp.o" for o in ("none", "native")}
     failures = [f"{name}: two instruction sets have code of this name, and it differs"
                 for name in shared_code(in_objects["none"], in_objects["native"], binary / "templates_alone_native_O0")]
+    failures += [f"{name}: not optimised, and its name does not say so (core/isa.hpp)" for name in symbols(in_objects["none"])
+                 if re.search(r"\dv\d+_\d+_", name) and "_unoptimised" not in name]
     with concurrent.futures.ThreadPoolExecutor(int(a.jobs)) as pool:
         said = dict(zip(programs, pool.map(lambda name: values(binary / name), programs)))
 

@@ -4,7 +4,8 @@
 /// bits or code. -march decides the number of lanes (math/lanes.hpp), and whether a*b + c is one rounding
 /// (math/arith.hpp). nvcc's host compiler has no lanes. Objects of one program may differ in these. They would share
 /// inline functions, templates and types of one name, and all would use one object's. With the instruction set in the
-/// name each has its own.
+/// name each has its own. The name says too where an object is not optimised (-O0), since a linker that kept the slow
+/// code of a program would make an optimised library slow. nvcc's names do not: its two compilers must agree on them.
 ///
 ///   namespace gart { inline namespace GART_ISA {   // formulas, kernels, host policies, tracers, trainers
 ///   namespace gart {                    // what the compiled libraries define and take, and link by
@@ -43,11 +44,18 @@
 #define GART_INSTRUCTION_SET base
 #endif
 
+#if defined(__OPTIMIZE__) || defined(__CUDACC__)
+#define GART_UNOPTIMISED
+#else
+/// Follows the instruction set in names, where the compiler does not optimise.
+#define GART_UNOPTIMISED _unoptimised
+#endif
+
 ///@{
 /// The inline namespace's name, as v0_1_avx2_fma.
-#define GART_ISA_PASTED(major, minor, set) v##major##_##minor##_##set
-#define GART_ISA_OF(major, minor, set) GART_ISA_PASTED(major, minor, set)
-#define GART_ISA GART_ISA_OF(GART_VERSION_MAJOR, GART_VERSION_MINOR, GART_INSTRUCTION_SET)
+#define GART_ISA_PASTED(major, minor, set, unoptimised) v##major##_##minor##_##set##unoptimised
+#define GART_ISA_OF(major, minor, set, unoptimised) GART_ISA_PASTED(major, minor, set, unoptimised)
+#define GART_ISA GART_ISA_OF(GART_VERSION_MAJOR, GART_VERSION_MINOR, GART_INSTRUCTION_SET, GART_UNOPTIMISED)
 ///@}
 
 /// As they stand; undefined below.
@@ -57,7 +65,8 @@
 
 namespace gart { inline namespace GART_ISA {
 
-inline constexpr char const* instruction_set = GART_TEXT(GART_INSTRUCTION_SET);  ///< "avx2_fma"
+/// "avx2_fma", or "avx2_fma_unoptimised".
+inline constexpr char const* instruction_set = GART_TEXT(GART_INSTRUCTION_SET) GART_TEXT(GART_UNOPTIMISED);
 
 }}  // namespace gart::GART_ISA
 
