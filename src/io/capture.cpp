@@ -167,6 +167,29 @@ std::optional<colmap_place> colmap_of(fs::path const& capture, std::vector<std::
   return std::nullopt;
 }
 
+bool holds_capture(fs::path const& folder) {
+  std::vector<std::string> unheard;
+  std::error_code ignored;
+  return colmap_of(folder, unheard) || fs::exists(folder / "transforms_train.json", ignored) ||
+         fs::exists(folder / "transforms.json", ignored);
+}
+
+// Of the folders at most three below, the first by name that holds a capture, such as dense/0; empty without one.
+fs::path capture_below(fs::path const& path) {
+  constexpr int deepest = 2;
+  constexpr int most_entries = 100'000;
+  fs::path first;
+  std::error_code code, ignored;
+  fs::recursive_directory_iterator at(path, fs::directory_options::skip_permission_denied, code);
+  for (int n = 0; !code && at != fs::recursive_directory_iterator() && n < most_entries; at.increment(code), ++n) {
+    if (!at->is_directory(ignored)) continue;
+    bool const earlier = first.empty() || at->path() < first;
+    if (earlier && holds_capture(at->path())) first = at->path();
+    if (at.depth() >= deepest) at.disable_recursion_pending();
+  }
+  return first;
+}
+
 capture read_files(fs::path const& path, fs::path const& photos) {
   std::error_code ignored;
   if (!fs::exists(path, ignored)) throw io_error(path.string(), "there is no such file or folder", "check the path");
@@ -195,9 +218,12 @@ capture read_files(fs::path const& path, fs::path const& photos) {
   }
   if (fs::exists(path / "transforms_train.json", ignored)) return read_blender(path);
   if (fs::exists(transforms, ignored)) return read_transforms(transforms);
+  fs::path const below = capture_below(path);
   throw io_error(
       path.string(), "holds no capture that gart reads",
-      "expected sparse/0 (COLMAP), transforms_train.json (Blender) or transforms.json (nerfstudio, instant-ngp)");
+      below.empty()
+          ? "expected sparse/0 (COLMAP), transforms_train.json (Blender) or transforms.json (nerfstudio, instant-ngp)"
+          : below.string() + " holds one: name it");
 }
 
 }  // namespace

@@ -302,6 +302,16 @@ TEST_CASE("what is missing, of a wrong type or not traced is named") {
   CHECK(holds(error_of([&] { gart::load_dataset(empty.path); }), "holds no capture"));
 }
 
+TEST_CASE("where no capture is found, the error names one that lies below") {
+  scratch_folder const folder;
+  folder.put("photos/later/transforms.json", "{}");
+  folder.put("dense/0/sparse/0/cameras.txt", "# none\n");
+  folder.put("dense/0/sparse/0/images.txt", "# none\n");
+  std::string const error = error_of([&] { gart::load_dataset(folder.path); });
+  CHECK(holds(error, "holds no capture"));
+  CHECK(holds(error, (folder.path / "dense/0").string() + " holds one"));
+}
+
 TEST_CASE("damaged JSON is refused and never crashes") {
   scratch_folder const folder;
   folder.put_image("a.png", 16, 12);
