@@ -121,7 +121,7 @@ class Pages:
             cells.append([row[0]] + [shown(v) for v in row[1:3]] +
                          [f"**{shown(v)}**" if v == best else shown(v) for v in row[3:]])
         cells.append([average[0]] + [shown(v) for v in average[1:]])
-        letters = {"exposure": "E", "vignetting": "V", "twentieth": "T", "pixels 100": "P", "by error": "D", "usual": "usual"}
+        letters = {"exposure": "E", "vignetting": "V", "twentieth": "T", "pixels 100": "P", "match": "M", "usual": "usual"}
         short = [" ".join(letters[part] for part in n.split(", ")) for n in names]
         self.tables["leave_one_out"] = table(["capture", "as chosen", "tuned on the others"] + short, cells)
 

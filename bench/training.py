@@ -59,7 +59,7 @@ RULES = (("all", []),
 EXPOSURE, VIGNETTING = ["--exposure", "on"], ["--vignetting", "on"]
 SETTINGS = (("usual", []), ("exposure", EXPOSURE), ("vignetting", VIGNETTING),
             ("exposure, vignetting", EXPOSURE + VIGNETTING), ("twentieth", ["--set", "rates.sh_rest=0.000125"]),
-            ("pixels 100", ["--set", "error.pixels_per_gaussian=100"]), ("by error", ["--set", "error.draw_by_root=0"]))
+            ("pixels 100", ["--set", "error.pixels_per_gaussian=100"]), ("match", ["--match", "on"]))
 
 
 def digest(data):

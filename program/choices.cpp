@@ -135,7 +135,8 @@ nlohmann::json measure(train_arguments a, gart::dataset const& data, gart::valid
                       {"psnr", t.psnr},
                       {"gain", t.gain},
                       {"noise", t.noise},
-                      {"taken", t.taken}});
+                      {"taken", t.taken},
+                      {"why", t.why}});
   return {{"held_out", found.plan.held_out.size()},
           {"shrink", found.plan.shrink},
           {"steps", found.plan.steps},
@@ -149,7 +150,7 @@ void settle(train_arguments& a, gart::dataset const& data, nlohmann::json const&
   };
   say("measured", measured["trials"].empty() ? "nothing" : "on held-out views", measured["why"]);
   for (auto const& t : measured["trials"]) {
-    std::string const setting = t["setting"], value = t["value"];
+    std::string const setting = t["setting"], value = t["value"], why = t.value("why", "");
     if (setting.empty()) continue;
     std::string* const own = option_of(a, setting);
     bool const length = setting == "iterations";
@@ -164,7 +165,7 @@ void settle(train_arguments& a, gart::dataset const& data, nlohmann::json const&
     }
     say((own || length ? "--" : "--set ") + setting + " " + value, t["taken"] ? "taken" : "left",
         (gain < 0 ? "" : "+") + fixed(gain, 2) + " dB, give or take " + fixed(t["noise"].get<double>(), 2) +
-            (t["taken"] && gain <= 0 ? "; a trial shows it worse than a whole run" : ""));
+            (why.empty() ? "" : "; " + why));
   }
   // Settings that were not measured keep the usual values.
   for (auto const& [own, given] :

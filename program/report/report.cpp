@@ -130,13 +130,14 @@ std::string choices(json const& m) {
   html += "</table></div>";
   if (!m.contains("measured") || m["measured"].value("trials", json::array()).empty()) return html;
   json const& measured = m["measured"];
-  html +=
-      "<p class=\"soft\">Tried before the run: " + text_of(measured, "why") +
-      ". PSNR is of these. A gain counts above its noise, and exposures unless they lose twice that. 1 dB is added to "
-      "what a shorter run gains.</p><div class=\"box\"><table><tr>"
-      "<th>Setting</th><th>Value</th><th class=\"n\">PSNR, dB</th><th class=\"n\">gain, dB</th><th></th></tr>";
+  html += "<p class=\"soft\">Tried before the run: " + text_of(measured, "why") +
+          ". PSNR is of these. A gain counts above its noise, where nothing else is said. 1 dB is added to what a "
+          "shorter run "
+          "gains.</p><div class=\"box\"><table><tr>"
+          "<th>Setting</th><th>Value</th><th class=\"n\">PSNR, dB</th><th class=\"n\">gain, dB</th><th></th></tr>";
   for (auto const& t : measured["trials"]) {
     bool const first = text_of(t, "setting").empty();
+    std::string const why = text_of(t, "why");
     html += "<tr><td>" + (first ? "as they come" : text_of(t, "setting")) + "</td><td>" + text_of(t, "value") +
             "</td><td class=\"n\">" + fixed(number_of(t, "psnr"), 3) + "</td><td class=\"n\">" +
             (first ? "" : fixed(number_of(t, "gain"), 3) + " &plusmn; " + fixed(number_of(t, "noise"), 3)) +
@@ -144,7 +145,7 @@ std::string choices(json const& m) {
             (first                     ? ""
              : t.value("taken", false) ? "taken"
                                        : "left") +
-            "</td></tr>";
+            (why.empty() ? "" : ": " + why) + "</td></tr>";
   }
   return html + "</table></div>";
 }

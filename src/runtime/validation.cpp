@@ -29,6 +29,7 @@ constexpr double step_share = 0.4, run_share = 0.1;
 constexpr float trial_exposure_rate = 0.015f;
 // dB of the gain of fewer steps, which small images show too little.
 constexpr double trial_understates = 1;
+constexpr char const* understated = "a trial shows it worse than a whole run";
 // Small images leave a GPU idle between kernels. Trials beside each other fill it: each adds about this share of the
 // time that it takes alone.
 constexpr double beside_share = 0.5;
@@ -214,6 +215,7 @@ class trial_round {
     for (std::size_t v = 0; v < psnr.size(); ++v) gains.push_back(psnr[v] - without[v]);
     trial tried{c.setting, c.value, mean(psnr), mean(gains), standard_error(gains)};
     tried.taken = tried.is_better(c.least_noises, c.understated);
+    if (tried.taken != tried.is_better()) tried.why = c.why;
     if (tried.taken) c.take(result_.options);
     result_.trials.push_back(tried);
   }
@@ -228,23 +230,29 @@ class trial_round {
 
 std::vector<candidate> default_candidates(capture_traits const& traits, train_options const& options) {
   std::vector<candidate> all;
-  all.push_back({"exposure", "on", [](train_options& o) { o.exposure = true; }, -2});
-  if (traits.matched > 0 && !options.match) all.push_back({"match", "on", [](train_options& o) { o.match = true; }});
-  if (!traits.panoramas) all.push_back({"vignetting", "on", [](train_options& o) { o.vignetting = true; }});
+  auto const add = [&](char const* setting, char const* value, void (*take)(train_options&)) -> candidate& {
+    return all.emplace_back(candidate{setting, value, take});
+  };
+  candidate& exposure = add("exposure", "on", [](train_options& o) { o.exposure = true; });
+  exposure.least_noises = -2, exposure.why = understated;
+  if (traits.matched > 0 && !options.match) add("match", "on", [](train_options& o) { o.match = true; });
+  if (!traits.panoramas) {
+    candidate& vignetting = add("vignetting", "on", [](train_options& o) { o.vignetting = true; });
+    vignetting.least_noises = 0, vignetting.why = "a wrong choice costs less than a missed one";
+  }
   error_growth_options more = options.error;
   more.pixels_per_gaussian = 100;
   index_t const most = options.max_gaussians;
   if (options.densify == densify_kind::error &&
       growth_budget(more, most, traits.pixels) > growth_budget(options.error, most, traits.pixels))
-    all.push_back({"error.pixels_per_gaussian", "100", [](train_options& o) { o.error.pixels_per_gaussian = 100; }});
-  all.push_back({"rates.sh_rest", "0.000125", [](train_options& o) { o.rates.sh_rest = 0.000125f; }});
-  if (options.densify == densify_kind::error)
-    all.push_back({"error.draw_by_root", "0", [](train_options& o) { o.error.draw_by_root = false; }});
+    add("error.pixels_per_gaussian", "100", [](train_options& o) { o.error.pixels_per_gaussian = 100; });
+  candidate& slow_bands = add("rates.sh_rest", "0.000125", [](train_options& o) { o.rates.sh_rest = 0.000125f; });
+  slow_bands.least_noises = 2, slow_bands.why = "it has to gain twice that: a wrong choice costs most";
   // Poses, lenses and depth take steps too, and trials have none of them.
   if (options.refine_poses || options.refine_lens || options.depth_weight > 0) return all;
   int const third = options.iterations / validation_plan::long_trial;
   all.push_back({"iterations", std::to_string(third), [third](train_options& o) { o.iterations = third; }, 1,
-                 trial_understates, true});
+                 trial_understates, true, understated});
   return all;
 }
 

@@ -159,8 +159,7 @@ TEST_CASE("a run whose length nobody gives is as long as its trials say") {
   write_capture(here / "capture", 24);
   fill_images(here / "capture", false);
   std::string const run =
-      "train capture --match off --exposure off --vignetting off --set rates.sh_rest=1e-3,error.draw_by_root=1 "
-      "--max-gaussians 30 "
+      "train capture --match off --exposure off --vignetting off --set rates.sh_rest=1e-3 --max-gaussians 30 "
       "--backend serial --stop-at 1 --out run ";
   auto const config_of = [&](std::string const& more) {
     auto const made = here.gart(run + more);
