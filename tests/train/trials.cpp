@@ -221,6 +221,28 @@ TEST_CASE("progress is told between parallel steps, and may end them") {
   CHECK(d.alive == 0);
 }
 
+TEST_CASE("a verdict that one noise would not give says why") {
+  device& d = the_device();
+  gart::train_options options;
+  options.iterations = 30000, options.random_points = 10;
+  gart::candidate helps{"exposure", "on", [](gart::train_options& o) { o.exposure = true; }};
+  gart::candidate harms{"vignetting", "on", [](gart::train_options& o) { o.vignetting = true; }};
+  helps.why = "it helps", harms.why = "it harms";
+  auto const found = [&] {
+    d.reset(unlimited, 3);
+    return gart::validate(fake_request(), options, grey(), {helps, harms});
+  };
+  auto const usual = found();
+  CHECK(usual.trials[1].why.empty());
+  CHECK(usual.trials[2].why.empty());
+  helps.least_noises = 1e6, harms.least_noises = -1e6;
+  auto const other = found();
+  CHECK(!other.options.exposure);
+  CHECK(other.options.vignetting);
+  CHECK(other.trials[1].why == "it helps");
+  CHECK(other.trials[2].why == "it harms");
+}
+
 TEST_CASE("a third of the steps is tried last, against a long trial") {
   device& d = the_device();
   gart::train_options options;

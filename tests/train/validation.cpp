@@ -218,6 +218,11 @@ TEST_CASE("what changes nothing of a run is no candidate") {
   CHECK(!gart::default_candidates(traits, of).back().shortens);
   CHECK(of.exposure);
   CHECK(of.vignetting);
+  for (auto const& c : gart::default_candidates({}, {})) {
+    CAPTURE(c.setting);
+    bool const by_one_noise = c.least_noises == 1 && c.understated == 0;
+    CHECK(c.why.empty() == by_one_noise);
+  }
 }
 
 TEST_CASE("trials that are ended count for nothing") {
