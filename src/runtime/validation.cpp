@@ -230,29 +230,39 @@ class trial_round {
 
 std::vector<candidate> default_candidates(capture_traits const& traits, train_options const& options) {
   std::vector<candidate> all;
-  auto const add = [&](char const* setting, char const* value, void (*take)(train_options&)) -> candidate& {
-    return all.emplace_back(candidate{setting, value, take});
-  };
-  candidate& exposure = add("exposure", "on", [](train_options& o) { o.exposure = true; });
-  exposure.least_noises = -2, exposure.why = understated;
-  if (traits.matched > 0 && !options.match) add("match", "on", [](train_options& o) { o.match = true; });
+  all.push_back({.setting = "exposure",
+                 .value = "on",
+                 .take = [](train_options& o) { o.exposure = true; },
+                 .least_noises = -2,
+                 .why = understated});
+  if (traits.matched > 0 && !options.match) all.push_back({"match", "on", [](train_options& o) { o.match = true; }});
   if (!traits.panoramas) {
-    candidate& vignetting = add("vignetting", "on", [](train_options& o) { o.vignetting = true; });
-    vignetting.least_noises = 0, vignetting.why = "a wrong choice costs less than a missed one";
+    all.push_back({.setting = "vignetting",
+                   .value = "on",
+                   .take = [](train_options& o) { o.vignetting = true; },
+                   .least_noises = 0,
+                   .why = "a wrong choice costs less than a missed one"});
   }
   error_growth_options more = options.error;
   more.pixels_per_gaussian = 100;
   index_t const most = options.max_gaussians;
   if (options.densify == densify_kind::error &&
       growth_budget(more, most, traits.pixels) > growth_budget(options.error, most, traits.pixels))
-    add("error.pixels_per_gaussian", "100", [](train_options& o) { o.error.pixels_per_gaussian = 100; });
-  candidate& slow_bands = add("rates.sh_rest", "0.000125", [](train_options& o) { o.rates.sh_rest = 0.000125f; });
-  slow_bands.least_noises = 2, slow_bands.why = "it has to gain twice that: a wrong choice costs most";
+    all.push_back({"error.pixels_per_gaussian", "100", [](train_options& o) { o.error.pixels_per_gaussian = 100; }});
+  all.push_back({.setting = "rates.sh_rest",
+                 .value = "0.000125",
+                 .take = [](train_options& o) { o.rates.sh_rest = 0.000125f; },
+                 .least_noises = 2,
+                 .why = "it has to gain twice that: a wrong choice costs most"});
   // Poses, lenses and depth take steps too, and trials have none of them.
   if (options.refine_poses || options.refine_lens || options.depth_weight > 0) return all;
   int const third = options.iterations / validation_plan::long_trial;
-  all.push_back({"iterations", std::to_string(third), [third](train_options& o) { o.iterations = third; }, 1,
-                 trial_understates, true, understated});
+  all.push_back({.setting = "iterations",
+                 .value = std::to_string(third),
+                 .take = [third](train_options& o) { o.iterations = third; },
+                 .understated = trial_understates,
+                 .shortens = true,
+                 .why = understated});
   return all;
 }
 
