@@ -1,5 +1,6 @@
 #include <support/policies.hpp>
 
+#include <gart/loss/error_map.hpp>
 #include <gart/loss/image_loss.hpp>
 
 #include "oracle.hpp"
@@ -31,9 +32,10 @@ struct case_data {
   std::vector<double> image_values(std::vector<double> const& y) const {
     std::vector<double> x(image.begin(), image.end());
     for (std::size_t i = 0; i < x.size(); ++i)
-      if (!mask.empty() && mask[i / 3] == 0) x[i] = y[i];
+      if ((!mask.empty() && mask[i / 3] == 0) || is_beyond_white(i, y)) x[i] = y[i];
     return x;
   }
+  bool is_beyond_white(std::size_t i, std::vector<double> const& y) const { return image[i] > 1 && y[i] * 255 > 249.5; }
 };
 
 // A smooth image with noise of the given size around the truth: what training sees.
@@ -42,7 +44,10 @@ case_data make_case(int width, int height, int channels, bool masked, double noi
   case_data d{width, height, {}, {}, {}, channels, vec3(0.2f, 0.9f, 0.5f)};
   d.image.resize(static_cast<std::size_t>(width) * height * 3);
   d.truth.resize(static_cast<std::size_t>(width) * height * channels);
-  for (auto& t : d.truth) t = static_cast<u8>(u(random) < 0.5 ? 200 : 255 * u(random));
+  for (auto& t : d.truth) {
+    double const kind = u(random);
+    t = static_cast<u8>(kind < 0.4 ? 200 : kind < 0.6 ? 245 + 11 * u(random) : 255 * u(random));
+  }
   if (masked) {
     d.mask.resize(static_cast<std::size_t>(width) * height);
     for (auto& m : d.mask) m = u(random) < 0.3 ? 0 : 255;
@@ -96,7 +101,7 @@ TEST_CASE_TEMPLATE("loss and gradient are those of the definition", E, GART_TEST
     CHECK(largest > 0);
     for (int sample = 0; sample < 60; ++sample) {
       std::size_t const i = random() % x.size();
-      if (!d.mask.empty() && d.mask[i / 3] == 0) {
+      if ((!d.mask.empty() && d.mask[i / 3] == 0) || d.is_beyond_white(i, y)) {
         CHECK(got.gradient[i] == 0.0f);
         continue;
       }
@@ -123,6 +128,27 @@ TEST_CASE_TEMPLATE("an image equal to the truth has no loss and no gradient", E,
   CHECK(got.loss[0] == 0.0f);
   CHECK(got.loss[1] == 0.0f);
   for (float const g : got.gradient) REQUIRE(g == 0.0f);
+}
+
+TEST_CASE_TEMPLATE("an overexposed sky is white however bright it was", E, GART_TEST_POLICIES) {
+  E exec;
+  case_data d{30, 24, std::vector<float>(30 * 24 * 3, 1.4f), std::vector<u8>(30 * 24 * 3, 251), {}};
+  result const white = evaluate(exec, d, 0.2f);
+  CHECK(white.loss[0] == 0.0f);
+  for (float const g : white.gradient) REQUIRE(g == 0.0f);
+  d.image[0] = 0.9f, d.truth[100] = 240;  // darker than white; grey that is too bright
+  result const got = evaluate(exec, d, 0.2f);
+  CHECK(got.gradient[0] < 0);
+  CHECK(got.gradient[100] > 0);
+  CHECK(got.gradient[1] == 0.0f);
+
+  buffer<float, E> image(exec, d.image), error(exec);
+  buffer<u8, E> truth(exec, d.truth);
+  error_map(exec, image, {truth.data()}, error);
+  std::vector<float> const errors = error.to_host();
+  CHECK(errors[0] == doctest::Approx((251 / 255.0 - 0.9) / 3).epsilon(1e-5));
+  CHECK(errors[100 / 3] == doctest::Approx((1.4 - 240 / 255.0) / 3).epsilon(1e-5));
+  CHECK(errors[1] == 0.0f);
 }
 
 TEST_CASE_TEMPLATE("a mask that hides everything leaves nothing", E, GART_TEST_POLICIES) {

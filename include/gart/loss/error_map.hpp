@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// The error of each pixel of an image: the mean over its channels of |image - truth|. Growth by error
-/// (train/densify/error_growth.hpp) attributes it to the Gaussians. image: [H][W][3]; error: [H][W], resized; 0 where a
-/// mask excludes the pixel. One launch, 20 bytes a pixel.
+/// The error of each pixel of an image: the mean over its channels of |image - truth|, 0 where both are white. Growth
+/// by error (train/densify/error_growth.hpp) attributes it to the Gaussians. image: [H][W][3]; error: [H][W], resized;
+/// 0 where a mask excludes the pixel. One launch, 20 bytes a pixel.
 
 #include <gart/loss/image_loss.hpp>
 
@@ -19,7 +19,7 @@ struct error_map_kernel {
     index_t const pixel = first + k;
     vec3 const y = truth.color(pixel);
     float sum = 0;
-    for (int c = 0; c < 3; ++c) sum += fabsf(image[std::size_t{3} * pixel + c] - y[c]);
+    for (int c = 0; c < 3; ++c) sum += fabsf(difference_of(image[std::size_t{3} * pixel + c], y[c]));
     error[pixel] = truth.counts(pixel) ? sum * (1.0f / 3.0f) : 0.0f;
   }
 };

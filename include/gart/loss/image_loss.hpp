@@ -2,7 +2,8 @@
 /// \file
 /// The training loss of an image x against the truth y, and its gradient in x:
 ///   L = (1 - w) mean|x - y| + w (1 - mean SSIM(x, y)),
-/// means over all pixels and the three channels. The image is not clamped to [0, 1].
+/// means over all pixels and the three channels. The image is not clamped to [0, 1]. But a photograph shows no more
+/// than white: where its channel is white and the image's is brighter, x counts as y, without gradient.
 ///
 /// SSIM is written in d = x - y. Near the optimum x and y agree, and their difference must not cancel:
 ///   SSIM = (1 - m_d^2 / B1) (1 - s_dd / B2),  B1 = m_x^2 + m_y^2 + C1,  B2 = s_xx + s_yy + C2
@@ -48,6 +49,16 @@ struct truth_view {
 
 namespace detail {
 
+// x - y of a channel. An overexposed sky is white however bright it was. JPEG leaves it a few levels below 255.
+// -0, which no x - y is, tells the gradient of such a pixel from that of x = y.
+GART_HD GART_INLINE float difference_of(float x, float y) {
+  constexpr float white = 249.5f / 255.0f;
+  return x > 1 && y > white ? -0.0f : x - y;
+}
+GART_HD GART_INLINE bool is_beyond_white(float difference) {
+  return difference == 0 && copysignf(1.0f, difference) < 0;
+}
+
 struct difference_kernel {
   float const* image;
   truth_view truth;
@@ -63,7 +74,7 @@ struct difference_kernel {
     for (int c = 0; c < 3; ++c) {
       std::size_t const at = c * size.pixels() + pixel;
       centred_truth[at] = y[c] - 0.5f;
-      difference[at] = counts ? image[std::size_t{pixel} * 3 + c] - y[c] : 0.0f;
+      difference[at] = counts ? difference_of(image[std::size_t{pixel} * 3 + c], y[c]) : 0.0f;
     }
   }
 };
@@ -206,7 +217,7 @@ struct loss_gradient_kernel {
         float const d = d_row[v * next], value = truth_row[v * next] + d;
         float const sign = d > 0 ? 1.0f : d < 0 ? -1.0f : d;  // a NaN stays one
         float const structure = sums[0][v] + 2.0f * (value * sums[1][v] + d * sums[2][v]);
-        out[v] = ((1.0f - weight) * sign - weight * structure) * share;
+        out[v] = is_beyond_white(d) ? 0.0f : ((1.0f - weight) * sign - weight * structure) * share;
       });
       // No division: its slow path would cost every training registers. 255 is 1 to the bit.
       tiles::each_inside(inside, [&](int v) {
