@@ -110,7 +110,7 @@ std::vector<gart::candidate> candidates_of(train_arguments const& a, gart::datas
   std::vector<gart::candidate> all;
   if (a.automatic) all = gart::default_candidates(gart::inspect(data), train_options_of(a));
   std::erase_if(all, [&](gart::candidate const& c) {
-    if (c.shortens) return a.length_given;
+    if (c.shortens) return a.length_given || !a.start.empty();
     std::string const* const own = option_of(a, c.setting);
     return own ? *own != "auto" : a.set.has(c.setting);
   });
@@ -137,11 +137,14 @@ nlohmann::json measure(train_arguments a, gart::dataset const& data, gart::valid
                       {"noise", t.noise},
                       {"taken", t.taken},
                       {"why", t.why}});
+  bool const ended = found.plan.tried > 0 && found.trials.empty();
   return {{"held_out", found.plan.held_out.size()},
           {"shrink", found.plan.shrink},
           {"steps", found.plan.steps},
           {"trials", trials},
-          {"why", a.automatic ? found.plan.why : "--no-auto: the usual settings"}};
+          {"why", !a.automatic ? "--no-auto: the usual settings"
+                  : ended      ? "no trial came to its end; planned were " + found.plan.why
+                               : found.plan.why}};
 }
 
 void settle(train_arguments& a, gart::dataset const& data, nlohmann::json const& measured, nlohmann::json& chosen) {

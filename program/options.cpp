@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <limits>
 
 namespace gart_cli {
 
@@ -37,7 +38,12 @@ nlohmann::json recorded_options::continue_from(nlohmann::json const& saved, std:
     }
     if (!named || given == e.get()) continue;
     bool const rises = std::find(may_rise.begin(), may_rise.end(), e.name) != may_rise.end();
-    if (rises && given > e.get()) {
+    // A budget of 0 is none, which is more than any.
+    auto const amount = [&e](nlohmann::json const& v) {
+      bool const endless = e.name == "time-budget" && v == 0.0;
+      return endless ? std::numeric_limits<double>::infinity() : v.get<double>();
+    };
+    if (rises && amount(given) > amount(e.get())) {
       raised[e.name] = e.get();
       take(given);
     } else {

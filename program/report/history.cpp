@@ -75,7 +75,8 @@ void history::restore(std::filesystem::path const& file, int step) {
     if (usable(row, 3)) test.push_back({row[0], row[1], row[2], seconds_at(row[0])});
     if (usable(row, 4) && row[3] >= 0.0) test.push_back({row[0], row[1], row[2], row[3]});
   }
-  seconds = train.empty() ? 0 : train.back().seconds;
+  // Of no step yet: what was measured before the first.
+  seconds = !train.empty() ? train.back().seconds : rows("train").empty() ? saved.value("seconds", 0.0) : 0;
 }
 
 }  // namespace gart_cli

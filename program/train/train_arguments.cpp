@@ -222,10 +222,20 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(train.get_option("--view-listen")), in_group(train.get_option("--view-port"));
 }
 
+namespace {
+
+// Recorded so, since a run may be resumed from anywhere.
+std::string whole_path(std::string const& path) {
+  return path.empty() ? path : fs::absolute(path).lexically_normal().string();
+}
+
+}  // namespace
+
 void fill_in(CLI::App const& train, train_arguments& a) {
   bool const by_count = train.get_option("--iterations")->count() > 0;
   if (a.preset == "quick" && !by_count) a.options.iterations = quick_iterations;
   a.length_given = by_count || a.preset == "quick" || a.time_budget > 0;
+  for (std::string* path : {&a.start, &a.photos, &a.poses, &a.scene}) *path = whole_path(*path);
 }
 
 void continue_run(train_arguments& a) {
@@ -245,6 +255,8 @@ void continue_run(train_arguments& a) {
        {std::pair{"t-min", "transmittance-min"}, {"lt-budget", "hit-memory"}, {"lt-format", "hit-format"}})
     if (options.contains(old)) options.emplace(now, options[old]);
   options.emplace("scene", "");
+  for (char const* path : {"start", "photos"})  // earlier runs recorded them as they were typed
+    if (options.contains(path) && options[path].is_string()) options[path] = whole_path(options[path]);
   // Runs that recorded --set as text had other defaults, which they keep.
   if (options.contains("set") && options["set"].is_string()) {
     std::string text = options["set"];

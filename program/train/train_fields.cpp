@@ -89,7 +89,16 @@ void field_values::add(std::string const& name, double value) {
 
 field_values field_values::of_text(std::string const& text) {
   field_values all;
-  each_of(text, [&](std::string const& name, double value) { all.add(name, value); });
+  each_of(text, [&](std::string const& name, double value) {
+    if (gart::option_field const* const field = gart::find_option_field(name)) {
+      if (std::string const flag = flag_of(*field); !flag.empty())
+        throw usage_error("--set " + name + ": has an option of its own, " + flag);
+      if (field->whole() && std::isfinite(value) && value != std::floor(value))
+        throw usage_error("--set " + name + "=" + gart::short_number(value) + ": a whole number belongs after " + name +
+                          "=");
+    }
+    all.add(name, value);
+  });
   return all;
 }
 

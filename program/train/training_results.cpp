@@ -189,7 +189,7 @@ nlohmann::json training_run::metrics_of(gart::scores const& result, gart::scores
   m["finite_steps"] = finite_steps_;
   if (a_.options.check_finite) m["skipped_updates"] = skipped_updates_;
   m["seconds"] = course_.seconds;
-  m["iterations_per_second"] = course_.seconds > 0 ? session_->steps_done() / course_.seconds : 0;
+  m["iterations_per_second"] = step_seconds_ > 0 ? steps_ / step_seconds_ : 0;
   m["wall_seconds"] = {{"loading", load_seconds_},
                        {"measuring", measure_seconds_},
                        {"training", step_seconds_},

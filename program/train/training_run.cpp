@@ -63,9 +63,10 @@ void training_run::prepare() {
   eval_background_ = background_color(a_.background);
   if (!a_.resume) measure_capture();
   course_ = course_of(a_), course_.seconds = measure_seconds_;
-  if (!a_.start.empty()) {
+  bool const starts = !a_.start.empty() && !a_.resume;  // else the checkpoint has all
+  if (starts) {
     std::error_code not_there;
-    if (!a_.resume && fs::equivalent(a_.start, a_.model_file(), not_there)) {
+    if (fs::equivalent(a_.start, a_.model_file(), not_there)) {
       throw usage_error("--start " + a_.start +
                         ": is the model in --out, which the run replaces (choose another --out)");
     }
@@ -90,9 +91,8 @@ void training_run::prepare() {
     prepare_folder(a_.out / "renders");
   }
   if (ranks::size() > 1) say_memory();
-  session_ = a_.start.empty()
-                 ? gart::make_session(request(), train_options_of(a_), data_)
-                 : gart::make_session(request(), train_options_of(a_), data_, gart::start_model(start_, true));
+  session_ = starts ? gart::make_session(request(), train_options_of(a_), data_, gart::start_model(start_, true))
+                    : gart::make_session(request(), train_options_of(a_), data_);
   start_ = {};
   a_.resume ? go_on() : begin_anew();
   say_choices();
@@ -100,9 +100,8 @@ void training_run::prepare() {
   load_seconds_ = loading.seconds();
 }
 
-// What --scene names; recorded as a whole path, as --poses is.
+// What --scene names.
 void training_run::read_mirrors() {
-  a_.scene = fs::absolute(a_.scene).lexically_normal().string();
   gart::scene_file file = gart::read_scene(a_.scene, data_.origin);
   for (std::string const& note : file.notes) say_.note("  " + note);
   if (file.scene.meshes.empty())
@@ -110,13 +109,12 @@ void training_run::read_mirrors() {
   data_.mirrors = std::move(file.scene);
 }
 
-// The message about --poses; recorded as a whole path, since a run may be resumed from anywhere.
+// The message about --poses.
 void training_run::check_poses() {
   if (a_.poses.empty()) return;
   if (!a_.options.refine_poses)
     throw usage_error("--poses " + a_.poses +
                       ": needs --refine-poses, which also aligns the test views before they are scored");
-  a_.poses = fs::absolute(a_.poses).lexically_normal().string();
   std::error_code not_there;
   if (!a_.resume && fs::equivalent(a_.poses, a_.out / "poses.json", not_there))
     throw usage_error("--poses " + a_.poses +
@@ -147,7 +145,7 @@ gart::row_owners training_run::owners() const {
 // The ranks' needs, before they take memory.
 void training_run::say_memory() {
   gart::train_options const options = train_options_of(a_);
-  gart::u64 const begin = a_.start.empty() ? gart::choose_start(data_, options).value.count : start_total_;
+  gart::u64 const begin = start_total_ > 0 ? start_total_ : gart::choose_start(data_, options).value.count;
   gart::u64 const most = gart::gaussians_at_end(options, data_, begin);
   say_.note(
       "each rank needs " +
@@ -155,13 +153,15 @@ void training_run::say_memory() {
       " at the least, for its part of " + with_commas(most) + " Gaussians, and the memory of the views");
 }
 
-// Rank 0 measures, and all take its result. For a run with a time limit it is at most a tenth of that time.
+// Rank 0 measures, and all take its result. For a run with a time limit it is at most a tenth of that time, and a
+// fiftieth where the first steps show that no trial would end.
 void training_run::measure_capture() {
   stopwatch const measuring;
   if (writes_) {
     measured_ = measure(a_, data_, [&](double done, std::string const& plan) {
       say_.state("measuring what the capture asks for: " + plan, done);
-      return a_.time_budget == 0 || measuring.seconds() < 0.1 * a_.time_budget;
+      double const spent = measuring.seconds(), most = 0.1 * a_.time_budget;
+      return a_.time_budget == 0 || (spent < most && !(spent > 0.2 * most && done < 0.1));
     });
   }
   measured_ = nlohmann::json::parse(ranks::agreed_text(measured_.dump()));
@@ -216,7 +216,9 @@ void training_run::load() {
 // Starting points, where neither the capture nor its depth maps have any, or where trials tell whether they pay.
 void training_run::match_photographs() {
   if (a_.resume || !a_.start.empty() || a_.match == "off") return;
-  bool const pays = data_.points.size() > 0 ? has_trials(a_, data_) : a_.options.depth_weight == 0;
+  // No photograph tells how long matching takes: a run with a time limit does it only where there is no point.
+  bool const pays =
+      data_.points.size() > 0 ? a_.time_budget == 0 && has_trials(a_, data_) : a_.options.depth_weight == 0;
   if (a_.match == "auto" && !pays) return;
   stopwatch const matching;
   data_.matched = gart::match_photographs(data_, a_.options.random_points, a_.options.seed,
@@ -234,6 +236,7 @@ void training_run::begin_anew() {
     nlohmann::json config = config_of(a_, data_);
     config["chosen"] = chosen_, config["measured"] = measured_;
     write_json(a_.config_file(), config);
+    write_json(a_.history_file(), course_.to_json());  // how much of a time budget is used
   }
   session_->save(a_.checkpoint_file());
 }

@@ -213,6 +213,11 @@ bool is_mine(dataset_options const& options, std::size_t i) {
          i % static_cast<std::size_t>(options.host->size()) == static_cast<std::size_t>(options.host->rank());
 }
 
+// Whether its mask excludes every pixel: it can be neither trained on nor scored.
+bool is_excluded(dataset_view const& v) {
+  return !v.mask.empty() && std::all_of(v.mask.data.begin(), v.mask.data.end(), [](u8 m) { return m == 0; });
+}
+
 // The views of the frames, in the frames' order.
 std::vector<dataset_view> load_views(capture& c, dataset_options const& options, std::size_t& scaled,
                                      std::size_t& decoded) {
@@ -303,10 +308,24 @@ dataset load(fs::path const& path, dataset_options const& options) {
   if (scaled) {
     data.notes.push_back(counted(scaled, "photo") + " differ in size from their cameras: the intrinsics were scaled");
   }
+  std::size_t excluded = 0;
+  std::string first_excluded;
   for (std::size_t i = 0; i < views.size(); ++i) {
+    if (is_excluded(views[i])) {
+      if (excluded++ == 0) first_excluded = c.frames[i].mask.string();
+      continue;
+    }
     data.alpha = data.alpha || views[i].image.channels == 4;
     (c.frames[i].role == part::test ? data.test : data.train).push_back(std::move(views[i]));
   }
+  if (excluded)
+    data.notes.push_back(counted(excluded, "view") + " left out: the mask excludes every pixel, such as " +
+                         first_excluded);
+  if (data.train.empty() && excluded)
+    throw io_error(
+        first_excluded,
+        "excludes every pixel, as the masks of " + counted(excluded, "view") + " do, and no view is left to train on",
+        "black is excluded: invert the masks, or leave them out (dataset_options.masks, --no-masks)");
   if (data.train.empty() && options.load_images) {
     throw io_error(path.string(),
                    "no view is left to train on, all " + counted(data.test.size(), "view") + " are test views",

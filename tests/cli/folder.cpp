@@ -186,6 +186,20 @@ TEST_CASE("a time budget ends the run and survives a stop") {
   CHECK(here.json("run/metrics.json")["seconds"].get<double>() > 2.7);
   CHECK(here.json("run/metrics.json")["iterations"].get<int>() > steps);
   CHECK(here.json("run/metrics.json")["raised"][0]["step"] == steps);
+  auto const lifted = here.gart("train --resume --out run --stop-at 1 --time-budget 0");
+  CHECK_MESSAGE(has(lifted.err, "--time-budget 0.0 instead of 3.0"), lifted.err);
+  auto const limited = here.gart("train --resume --out run --time-budget 9");
+  CHECK(limited.code == 2);
+  CHECK_MESSAGE(has(limited.err, "can only be raised"), limited.err);
+}
+
+TEST_CASE("a run with a time budget that was killed early can be resumed") {
+  folder const here;
+  write_capture(here / "capture");
+  std::string const run = "train capture --iterations 100000000 --time-budget 1000 --backend serial --max-gaussians 60";
+  CHECK(here.gart_interrupted_at(" it/s", run + " --out run --eval-every 0", SIGKILL).code != 0);
+  auto const resumed = here.gart("train --resume --out run --stop-at 1");
+  CHECK_MESSAGE(resumed.code == 130, resumed.err);
 }
 
 TEST_CASE("a time budget that steps do not come to changes no bit") {

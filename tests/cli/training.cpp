@@ -210,6 +210,16 @@ TEST_CASE("a model's header keeps the near distance; --start reads it") {
   CHECK(model.size() == 1);
   CHECK(model.sh_degree == 1);
   CHECK(here.gart("train capture --out none --start start.ply --max-gaussians 0").code == 2);
+
+  // The checkpoint has all: it goes on from anywhere, without the model.
+  REQUIRE(
+      here.gart("train capture --out part --start start.ply --iterations 3 --stop-at 1 --densify none" + small).code ==
+      130);
+  CHECK(here.json("part/config.json")["options"]["start"] == (here / "start.ply").string());
+  fs::remove(here / "start.ply");
+  auto const resumed = here.gart("train --resume --out part");
+  REQUIRE_MESSAGE(resumed.code == 0, resumed.err);
+  CHECK(text_of(here / "part/model.ply") == text_of(here / "run/model.ply"));
 }
 
 TEST_CASE("a run without test views says so instead of scoring nothing") {

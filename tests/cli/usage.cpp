@@ -137,6 +137,12 @@ TEST_CASE("rules are set by name and kept; unknown ones are refused") {
   auto const unknown = here.gart(run + "none --set rates.speed=1");
   CHECK(unknown.code == 2);
   CHECK_MESSAGE(has(unknown.err, "--set rates.speed: no such field (see "), unknown.err);
+  auto const own = here.gart(run + "none --set iterations=5");
+  CHECK(own.code == 2);
+  CHECK_MESSAGE(has(own.err, "--set iterations: has an option of its own, --iterations"), own.err);
+  auto const fraction = here.gart(run + "none --set error.every=0.9");
+  CHECK(fraction.code == 2);
+  CHECK_MESSAGE(has(fraction.err, "a whole number belongs after error.every="), fraction.err);
   auto const text = here.gart(run + "none --set near=far");
   CHECK(text.code == 2);
   CHECK_MESSAGE(has(text.err, "a finite number belongs after near="), text.err);

@@ -70,6 +70,37 @@ TEST_CASE("Blender: field of view, axes, alpha, the files' own split") {
   CHECK(gart::load_dataset(folder.path).points.size() == 1);
 }
 
+TEST_CASE("views of which masks leave nothing are left out, and named") {
+  scratch_folder const folder;
+  std::string frames;
+  for (int i = 0; i < 4; ++i) {
+    std::string const number = std::to_string(i);
+    frames += (i ? "," : "") + frame("images/" + number + ".png", i, ", \"mask_path\": \"masks/" + number + ".png\"");
+    folder.put_image("images/" + number + ".png", 16, 12);
+  }
+  fs::path const path = folder.put("transforms.json", scene(lens, frames));
+  fs::create_directories(folder.path / "masks");
+  auto const put_masks = [&](int sound) {
+    for (int i = 0; i < 4; ++i) {
+      gart::image8 mask(16, 12, 1);
+      if (i < sound) mask.at(3, 5, 0) = 255;
+      gart::write_png(folder.path / "masks" / (std::to_string(i) + ".png"), mask);
+    }
+  };
+  put_masks(3);
+  gart::dataset const data = gart::load_dataset(folder.path, {.test_every = 2});
+  CHECK(data.test.size() == 2);
+  CHECK(data.train.size() == 1);
+  CHECK(any_note(data, "1 view left out: the mask excludes every pixel, such as "));
+  put_masks(0);
+  CHECK_THROWS_WITH_AS(gart::load_dataset(folder.path), doctest::Contains("invert the masks"), gart::io_error);
+  gart::dataset_options unmasked;
+  unmasked.masks = false;
+  CHECK(gart::load_dataset(folder.path, unmasked).train.size() +
+            gart::load_dataset(folder.path, unmasked).test.size() ==
+        4);
+}
+
 TEST_CASE("nerfstudio: intrinsics, masks, points, lost photos, split") {
   scratch_folder const folder;
   std::string frames;

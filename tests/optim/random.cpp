@@ -67,7 +67,9 @@ TEST_CASE("the rate of the means decays exponentially") {
   CHECK(exponential_decay(1e-2f, 1e-4f, 50, 100) == doctest::Approx(1e-3));
   CHECK(exponential_decay(1e-2f, 1e-4f, 100, 100) == doctest::Approx(1e-4));
   CHECK(exponential_decay(1e-2f, 1e-4f, 1000, 100) == doctest::Approx(1e-4));
-  CHECK(exponential_decay(1e-2f, 0, 50, 100) == 1e-2f);
+  CHECK(exponential_decay(1e-2f, 0, 25, 100) == doctest::Approx(0.75e-2));
+  CHECK(exponential_decay(1e-2f, 0, 100, 100) == 0.0f);
+  CHECK(exponential_decay(0, 1e-2f, 50, 100) == 0.0f);
   learning_rates usual;
   CHECK(rates_at(usual, 3.0f, 0, 20000).mean == doctest::Approx(3 * usual.mean));
   CHECK(rates_at(usual, 3.0f, 20000, 20000).mean == doctest::Approx(3 * usual.mean_final));

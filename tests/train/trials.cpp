@@ -243,6 +243,40 @@ TEST_CASE("a verdict that one noise would not give says why") {
   CHECK(other.trials[2].why == "it harms");
 }
 
+TEST_CASE("blank and masked photographs decide nothing") {
+  device& d = the_device();
+  gart::train_options options;
+  options.iterations = 30000, options.random_points = 10;
+  std::vector<gart::candidate> const candidates{{"exposure", "on", [](gart::train_options& o) { o.exposure = true; }}};
+  gart::dataset data = grey();
+  auto const found = [&] {
+    d.reset(unlimited, 2);
+    return gart::validate(fake_request(), options, data, candidates);
+  };
+  auto const all = found();
+  data.train[2].mask = gart::image8(12, 12, 1, 0);  // held out, as 6, 10 and 14 are
+  auto const masked = found();
+  REQUIRE(masked.trials.size() == 2);
+  CHECK(std::isfinite(masked.trials[1].gain));
+  CHECK(masked.trials[1].gain == doctest::Approx(all.trials[1].gain).epsilon(0.05));
+  // Rendered exactly, its error is none, and its gain from there would be any.
+  data.train[2].mask = {};
+  for (auto& x : data.train[2].image.data) x = 0;
+  data.train[2].view.fx = -5100;  // the fake renders 0 at most
+  auto const blank = found();
+  CHECK(std::isfinite(blank.trials[1].noise));
+  for (gart::trial const& t : blank.trials) CHECK(t.psnr < 59);
+  for (std::size_t const i : {2u, 6u, 10u}) data.train[i].mask = gart::image8(12, 12, 1, 0);
+  CHECK(found().trials.empty());
+}
+
+TEST_CASE("trials have the capture's mirrors, and name a view that is too small") {
+  gart::dataset data = grey();
+  data.mirrors.meshes.resize(1);
+  CHECK(gart::shrunk(data, 2).mirrors.meshes.size() == 1);
+  CHECK_THROWS_AS(gart::shrunk(data, 100), gart::invalid_argument);
+}
+
 TEST_CASE("a third of the steps is tried last, against a long trial") {
   device& d = the_device();
   gart::train_options options;

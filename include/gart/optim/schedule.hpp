@@ -10,11 +10,12 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// from * (to / from)^(step / steps): log-linear, `to` at and after `steps`. Both must be positive; where one is not,
-/// the rate stays at `from`.
+/// from * (to / from)^(step / steps): log-linear, `to` at and after `steps`. To 0 it falls in a straight line. A rate
+/// of 0, or one below it, stays.
 inline float exponential_decay(float from, float to, int step, int steps) {
-  if (!(from > 0) || !(to > 0) || steps <= 0) return from;
+  if (!(from > 0) || steps <= 0) return from;
   double const share = std::clamp(static_cast<double>(step) / steps, 0.0, 1.0);
+  if (!(to > 0)) return static_cast<float>(from * (1 - share));
   return static_cast<float>(from * std::pow(static_cast<double>(to) / from, share));
 }
 

@@ -29,6 +29,8 @@ struct option_field {
   std::string_view group;  ///< heading in the help
   std::string_view help;   ///< help, with the unit
 
+  /// Whether it takes no fractions.
+  bool whole() const { return of.index() > 0; }
   /// Its value.
   double get(train_options const& options) const {
     return std::visit([&](auto at) { return static_cast<double>(at(const_cast<train_options&>(options))); }, of);

@@ -53,11 +53,13 @@ void basic_trainer<E, Traits, Tracer, Method, Comm>::take_up(training_state cons
   if (s.origin != data_.origin)
     throw invalid_argument("trainer: the state is from the origin " + to_text(s.origin) + ", the capture from " +
                            to_text(data_.origin) + " (dataset_options.origin holds it from that)");
+  if (s.seed != options_.seed)
+    throw invalid_argument("trainer: the state is of seed " + std::to_string(s.seed) + ", the options of " +
+                           std::to_string(options_.seed) + ", and draws would be of neither run");
   for (auto const& part : parts_) part->load(s.parts);
   gaussians_.assign(s.scene, s.first, s.second);
   gaussians_.total = static_cast<index_t>(total_of(comm_, {s.scene, true}));
   densifier_->load(s.parts);
-  options_.seed = s.seed;
   views_.order = view_order(data_.train.size(), options_.held_out, options_.seed);
   progress_.step = s.step;
 }

@@ -104,8 +104,10 @@ depth_search::likenesses depth_search::compare(patch const& p, float inverse_dep
     if (!(area > 0.1f && area < 10)) continue;  // far larger or smaller: not comparable
     float const reach_x = patch_radius * (std::fabs(across.x) + std::fabs(down.x));
     float const reach_y = patch_radius * (std::fabs(across.y) + std::fabs(down.y));
-    if (!(at[0].x >= reach_x && at[0].y >= reach_y && at[0].x + reach_x < static_cast<float>(photo.width - 1) &&
-          at[0].y + reach_y < static_cast<float>(photo.height - 1)))
+    constexpr float rounding = 1e-3f;  // the sums below are rounded otherwise than these
+    if (!(at[0].x >= reach_x + rounding && at[0].y >= reach_y + rounding &&
+          at[0].x + reach_x < static_cast<float>(photo.width - 1) - rounding &&
+          at[0].y + reach_y < static_cast<float>(photo.height - 1) - rounding))
       continue;
     float sum = 0, sum2 = 0, product = 0;
     bool known = true;
