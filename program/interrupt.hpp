@@ -2,7 +2,7 @@
 // Turns Ctrl-C, SIGTERM and SIGHUP into a flag that the run reads between steps, so that its files end whole. A second
 // signal ends the program at once, if it comes a second or more later. A terminal and a parent may each send one. The
 // handler stays after the first signal: the second may come while the program ends. An ignored SIGHUP (nohup) stays
-// ignored. While the guard exists, SIGPIPE does not end the program: the reader of its progress may be gone.
+// ignored.
 
 #include <csignal>
 #include <ctime>
@@ -31,11 +31,8 @@ class interrupt_guard {
       bool const outlived = w.number == SIGHUP && w.before.sa_handler == SIG_IGN;
       if (!outlived) sigaction(w.number, &action, nullptr);
     }
-    action.sa_handler = SIG_IGN;
-    sigaction(SIGPIPE, &action, &pipe_before_);
   }
   ~interrupt_guard() {
-    sigaction(SIGPIPE, &pipe_before_, nullptr);
     if (wanted_) return;
     for (watched const& w : signals_) sigaction(w.number, &w.before, nullptr);
   }
@@ -52,7 +49,22 @@ class interrupt_guard {
     struct sigaction before = {};
   };
   watched signals_[3] = {{SIGINT}, {SIGTERM}, {SIGHUP}};
-  struct sigaction pipe_before_ = {};
+};
+
+// While it exists SIGPIPE does not end the program: the reader of its progress may be gone.
+class broken_pipe_guard {
+ public:
+  broken_pipe_guard() {
+    struct sigaction action = {};
+    action.sa_handler = SIG_IGN;
+    sigaction(SIGPIPE, &action, &before_);
+  }
+  ~broken_pipe_guard() { sigaction(SIGPIPE, &before_, nullptr); }
+  broken_pipe_guard(broken_pipe_guard const&) = delete;
+  broken_pipe_guard& operator=(broken_pipe_guard const&) = delete;
+
+ private:
+  struct sigaction before_ = {};
 };
 
 }  // namespace gart_cli

@@ -27,6 +27,15 @@ void prepare_folder(fs::path const& folder) {
   fs::remove(probe, failure);
 }
 
+void try_folder(fs::path const& folder) {
+  std::vector<fs::path> made;  // by this, the innermost first
+  std::error_code failure;
+  for (fs::path at = fs::absolute(folder).lexically_normal(); !fs::exists(at, failure); at = at.parent_path())
+    made.push_back(at);
+  prepare_folder(folder);
+  for (fs::path const& at : made) fs::remove(at, failure);
+}
+
 void prepare_file(fs::path const& file) {
   if (fs::is_directory(file)) throw gart::io_error(file.string(), "is a folder", "name a file");
   prepare_folder(file.has_parent_path() ? file.parent_path() : fs::path("."));

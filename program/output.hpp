@@ -10,6 +10,8 @@ namespace gart_cli {
 
 // Makes a missing folder. io_error, naming it, where files cannot be put there.
 void prepare_folder(std::filesystem::path const& folder);
+// Whether that can be done; it leaves nothing behind.
+void try_folder(std::filesystem::path const& folder);
 // The same for the folder of a file that will be written.
 void prepare_file(std::filesystem::path const& file);
 

@@ -64,6 +64,12 @@ std::vector<double> times_of(fs::path const& keyframes, bool closed) {
   return times;
 }
 
+std::string frame_name(std::size_t number) {
+  char name[32];
+  std::snprintf(name, sizeof name, "frame_%05zu", number);
+  return name;
+}
+
 // The cameras of the file, or the frames of the path through the keyframes' file.
 std::vector<gart::named_camera> cameras_of(render_arguments const& a) {
   if (a.path.empty() == a.cameras.empty())
@@ -78,11 +84,8 @@ std::vector<gart::named_camera> cameras_of(render_arguments const& a) {
   std::vector<gart::camera> keyframes;
   for (gart::named_camera const& c : gart::load_cameras(a.path)) keyframes.push_back(c.view);
   std::vector<gart::named_camera> cameras;
-  char name[32];
-  for (gart::camera const& view : gart::smooth_path(keyframes, a.frames, a.closed, times_of(a.path, a.closed))) {
-    std::snprintf(name, sizeof name, "frame_%05zu", cameras.size());
-    cameras.push_back({name, view});
-  }
+  for (gart::camera const& view : gart::smooth_path(keyframes, a.frames, a.closed, times_of(a.path, a.closed)))
+    cameras.push_back({frame_name(cameras.size()), view});
   return cameras;
 }
 
@@ -216,6 +219,8 @@ int run_render(render_arguments a) {
               share);
   }
   files.finish();
+  if (fs::path const next = a.out / (frame_name(cameras.size()) + ".png"); !a.path.empty() && fs::exists(next))
+    say.note("NOTE: " + next.string() + " is of an earlier, longer film: remove it and what follows it");
   for (auto const& [label, time] : how.profile->stages()) timings["stages_ms"][label] = time.milliseconds;
   timings["peak_bytes"] = ranks::largest(how.peak_bytes());
   timings = of_all_ranks(timings, cameras.size());

@@ -31,7 +31,8 @@ void add_train(CLI::App& app, command& selected) {
       "  renders/          each test view: NAME.png, and NAME_truth.png beside it\n"
       "  checkpoint.gart   all that the next step depends on; with config.json and history.json what --resume needs\n"
       "A run that was in DIR before is replaced, all of it; files of these names that no run left there are not.\n"
-      "Ctrl-C, SIGTERM or SIGHUP finishes the step, saves, and exits with 130.\n"
+      "Ctrl-C, SIGTERM or SIGHUP finishes the step, saves, and exits with 130. Before the first step nothing is "
+      "saved.\n"
       "\nExamples:\n"
       "  gart train lego --out run --downscale 4 --iterations 2000 --max-gaussians 20000\n"
       "  gart train --resume --out run");

@@ -18,9 +18,15 @@ namespace gart_cli {
 namespace fs = std::filesystem;
 
 int training_run::run() {
-  prepare();
-  serve();
+  broken_pipe_guard const unread;
+  read_capture();
   std::optional<interrupt_guard> interrupt(std::in_place);  // until a run that it stops is saved
+  if (!a_.resume && !measure_capture(*interrupt)) {
+    say_.note("Stopped before the first step: nothing is saved, and nothing was replaced.");
+    return exit_interrupted;
+  }
+  begin();
+  serve();
   bool const finished = train(*interrupt);
   stopwatch const saving;
   save();
@@ -41,15 +47,19 @@ int training_run::run() {
   return 0;
 }
 
-void training_run::prepare() {
+// What is given is looked at before what takes long.
+void training_run::read_capture() {
   stopwatch const loading;
+  if (a_.out.empty()) throw usage_error("--out: a folder belongs there (see gart train --help)");
   if (writes_ && fs::is_directory(a_.out)) enter();
+  if (writes_) try_folder(a_.out);
   if (a_.resume) continue_run(a_);
   share_out();
   if (a_.dataset.empty()) throw usage_error("DATASET is missing (see gart train --help)");
   check_poses();
   configuration_ = gart::resolve(request());  // a missing file is known before images are read
   load();
+  load_start();
   match_photographs();
   chosen_ = choose(a_, data_);
   configuration_ = gart::resolve(request());
@@ -61,43 +71,49 @@ void training_run::prepare() {
     if (choice["option"] == "--backward") choice["value"] = a_.backward;
   }
   eval_background_ = background_color(a_.background);
-  if (!a_.resume) measure_capture();
+  load_seconds_ = loading.seconds() - measure_seconds_;
+}
+
+void training_run::begin() {
+  stopwatch const beginning;
   course_ = course_of(a_), course_.seconds = measure_seconds_;
-  bool const starts = !a_.start.empty() && !a_.resume;  // else the checkpoint has all
-  if (starts) {
-    std::error_code not_there;
-    if (fs::equivalent(a_.start, a_.model_file(), not_there)) {
-      throw usage_error("--start " + a_.start +
-                        ": is the model in --out, which the run replaces (choose another --out)");
-    }
-    gart::model_file file = gart::load_model(a_.start, owners());
-    say_.notes(file.notes);
-    if (file.kernel_degree != a_.kernel_degree) {
-      throw usage_error("--start " + a_.start + ": is of kernel degree " + std::to_string(file.kernel_degree) +
-                        ", the run of " + std::to_string(a_.kernel_degree) + " (give --kernel-degree " +
-                        std::to_string(file.kernel_degree) + ")");
-    }
-    gart::move_origin(file.model, file.origin, data_.origin);
-    start_ = gart::with_sh_degree(std::move(file.model), configuration_.sh_degree);
-    start_total_ = file.total;
-    if (file.total > a_.options.max_gaussians) {
-      throw usage_error("--start " + a_.start + ": has " + with_commas(file.total) +
-                        " Gaussians, more than --max-gaussians " + std::to_string(a_.options.max_gaussians));
-    }
-  }
   if (writes_) {
     prepare_folder(a_.out);
     enter();
     prepare_folder(a_.out / "renders");
   }
   if (ranks::size() > 1) say_memory();
-  session_ = starts ? gart::make_session(request(), train_options_of(a_), data_, gart::start_model(start_, true))
-                    : gart::make_session(request(), train_options_of(a_), data_);
+  session_ = a_.start.empty() || a_.resume
+                 ? gart::make_session(request(), train_options_of(a_), data_)
+                 : gart::make_session(request(), train_options_of(a_), data_, gart::start_model(start_, true));
   start_ = {};
   a_.resume ? go_on() : begin_anew();
   say_choices();
   say_.note(a_.backend + " backend, " + a_.tracer + " tracer, " + configuration_.backward + " backward pass");
-  load_seconds_ = loading.seconds();
+  load_seconds_ += beginning.seconds();
+}
+
+// The Gaussians of --start; a checkpoint has all of a run that is resumed.
+void training_run::load_start() {
+  if (a_.start.empty() || a_.resume) return;
+  std::error_code not_there;
+  if (fs::equivalent(a_.start, a_.model_file(), not_there)) {
+    throw usage_error("--start " + a_.start + ": is the model in --out, which the run replaces (choose another --out)");
+  }
+  gart::model_file file = gart::load_model(a_.start, owners());
+  say_.notes(file.notes);
+  if (file.kernel_degree != a_.kernel_degree) {
+    throw usage_error("--start " + a_.start + ": is of kernel degree " + std::to_string(file.kernel_degree) +
+                      ", the run of " + std::to_string(a_.kernel_degree) + " (give --kernel-degree " +
+                      std::to_string(file.kernel_degree) + ")");
+  }
+  gart::move_origin(file.model, file.origin, data_.origin);
+  start_ = gart::with_sh_degree(std::move(file.model), configuration_.sh_degree);
+  start_total_ = file.total;
+  if (file.total > a_.options.max_gaussians) {
+    throw usage_error("--start " + a_.start + ": has " + with_commas(file.total) +
+                      " Gaussians, more than --max-gaussians " + std::to_string(a_.options.max_gaussians));
+  }
 }
 
 // What --scene names.
@@ -155,18 +171,22 @@ void training_run::say_memory() {
 
 // Rank 0 measures, and all take its result. For a run with a time limit it is at most a tenth of that time, and a
 // fiftieth where the first steps show that no trial would end.
-void training_run::measure_capture() {
+// False where it was interrupted.
+bool training_run::measure_capture(interrupt_guard const& interrupt) {
   stopwatch const measuring;
   if (writes_) {
     measured_ = measure(a_, data_, [&](double done, std::string const& plan) {
-      say_.state("measuring what the capture asks for: " + plan, done);
+      say_.state("measuring what the capture asks for: " + plan + ", " + fixed(100 * done, 0) + "% done", done);
+      if (interrupt.wanted()) return false;
       double const spent = measuring.seconds(), most = 0.1 * a_.time_budget;
       return a_.time_budget == 0 || (spent < most && !(spent > 0.2 * most && done < 0.1));
     });
   }
+  if (ranks::agreed(interrupt.wanted())) return false;
   measured_ = nlohmann::json::parse(ranks::agreed_text(measured_.dump()));
   settle(a_, data_, measured_, chosen_);
   measure_seconds_ += measuring.seconds();
+  return true;
 }
 
 void training_run::say_choices() {

@@ -45,7 +45,8 @@ class training_run {
 
  private:
   // Before the first step (training_run.cpp).
-  void prepare();
+  void read_capture();
+  void load_start();
   void check_poses();
   void read_mirrors();
   void share_out();
@@ -53,7 +54,8 @@ class training_run {
   gart::row_owners owners() const;
   void say_memory();
   void say_choices();
-  void measure_capture();
+  bool measure_capture(interrupt_guard const& interrupt);
+  void begin();
   void enter();
   void load();
   void match_photographs();

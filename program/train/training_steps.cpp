@@ -141,8 +141,8 @@ void training_run::show(gart::step_report const& report, recent_steps const& rec
   say_.state(with_commas(report.step) + (a_.time_budget > 0 ? "" : "/" + with_commas(a_.options.iterations)) + "  " +
                  fixed(rate, rate < 10 ? 2 : 0) + " it/s  loss " + fixed(recent.loss, 4) + "  PSNR " +
                  fixed(recent.psnr, 2) + " dB  " + with_commas(report.gaussians) + " Gaussians  " +
-                 as_duration(a_.time_budget > 0 ? std::min(left, a_.time_budget - course_.seconds) : left) + " left" +
-                 in_ranks(recent, session_->peak_bytes()),
+                 as_duration(a_.time_budget > 0 ? std::clamp(a_.time_budget - course_.seconds, 0.0, left) : left) +
+                 " left" + in_ranks(recent, session_->peak_bytes()),
              share);
 }
 

@@ -235,7 +235,10 @@ capture read_capture(fs::path const& path, dataset_options const& options) {
   capture c = read_files(path, options.photos);
   if (!options.photos.empty()) c.photos = options.photos;
   find_photos(c);
-  if (options.masks) find_masks(c);
+  if (options.masks)
+    find_masks(c);
+  else
+    for (frame& f : c.frames) f.mask.clear();
   return c;
 }
 

@@ -157,6 +157,37 @@ TEST_CASE("a finished run continues where iterations are raised") {
   CHECK(here.json("run/history.json")["train"].back()[0] == 25);
 }
 
+TEST_CASE("a log that nobody reads any more costs no result") {
+  folder const here;
+  write_capture(here / "capture");
+  std::string const run = "cd '" + (here / ".").string() + "' && '" GART_PROGRAM "' train capture --out run" +
+                          " --iterations 60 --backend serial --max-gaussians 60 2>&1 | head -c 1 >/dev/null";
+  REQUIRE(std::system(run.c_str()) == 0);
+  CHECK(fs::exists(here / "run/metrics.json"));
+  CHECK(fs::exists(here / "run/report.html"));
+}
+
+TEST_CASE("a folder that cannot be made is refused before anything is read") {
+  folder const here;
+  gart::write_file(here / "file", "x");
+  auto const below = here.gart("train nowhere --out file/run");
+  CHECK(below.code == 1);
+  CHECK_MESSAGE(has(below.err, "file/run: cannot be made a folder"), below.err);
+  auto const good = here.gart("train nowhere --out deep/run");
+  CHECK_MESSAGE(has(good.err, "nowhere"), good.err);
+  CHECK_FALSE(fs::exists(here / "deep"));
+  CHECK(here.gart("train nowhere --out ''").code == 2);
+}
+
+TEST_CASE("Ctrl-C during trials ends the run, and leaves nothing") {
+  folder const here;
+  write_capture(here / "capture", 16);
+  auto const run = here.gart_interrupted_at("measuring", "train capture --out run --backend serial --max-gaussians 60");
+  CHECK(run.code == 130);
+  CHECK_MESSAGE(has(run.err, "Stopped before the first step"), run.err);
+  CHECK_FALSE(fs::exists(here / "run"));
+}
+
 TEST_CASE("a time budget ends the run and survives a stop") {
   folder const here;
   write_capture(here / "capture");
