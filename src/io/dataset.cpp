@@ -325,7 +325,7 @@ dataset load(fs::path const& path, dataset_options const& options) {
     throw io_error(
         first_excluded,
         "excludes every pixel, as the masks of " + counted(excluded, "view") + " do, and no view is left to train on",
-        "black is excluded: invert the masks, or leave them out (dataset_options.masks, --no-masks)");
+        "black is excluded: invert the masks, or leave them out (dataset_options.masks)");
   if (data.train.empty() && options.load_images) {
     throw io_error(path.string(),
                    "no view is left to train on, all " + counted(data.test.size(), "view") + " are test views",
