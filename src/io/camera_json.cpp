@@ -270,7 +270,7 @@ named_camera parse_camera_json(std::string_view object, std::string const& where
   try {
     root = io::json::parse(object);
   } catch (io::json::exception const& e) {
-    throw io_error(where, std::string("is not valid JSON: ") + e.what(), "write {\"width\", ...}");
+    throw io_error(where, "is not valid JSON: " + json_fault_of(e.what()).what, "write {\"width\", ...}");
   }
   io::record const r{root, nullptr, where};
   if (!r.own.is_object()) throw io_error(where, "is not a JSON object", "write {\"width\", ...}");

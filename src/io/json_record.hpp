@@ -5,6 +5,7 @@
 
 #include <gart/core/error.hpp>
 #include <gart/io/file.hpp>
+#include <gart/io/json_fault.hpp>
 
 #include <nlohmann/json.hpp>
 
@@ -39,7 +40,9 @@ inline json read_json(std::filesystem::path const& path) {
   try {
     return json::parse(quoted.begin(), quoted.end());
   } catch (json::exception const& e) {
-    throw io_error(path.string(), std::string("is not valid JSON: ") + e.what(), "the file is truncated or damaged");
+    json_fault const fault = json_fault_of(e.what());
+    throw io_error(path.string(), "is not valid JSON: " + fault.what,
+                   fault.cut ? "the file is truncated: copy or export it again" : "correct it at that place");
   }
 }
 

@@ -72,3 +72,10 @@ TEST_CASE("formats have names, endings and readers, and know their own") {
 }
 
 }  // namespace
+
+TEST_CASE("a glTF file that is empty or no JSON is refused without the parser's own names") {
+  scratch_folder const folder;
+  CHECK(holds(error_of([&] { gart::read_splats(folder.put("a.glb", "")); }), "is empty (the file is truncated"));
+  std::string const error = error_of([&] { gart::read_splats(folder.put("b.glb", "{\"meshes\": [1,]}")); });
+  CHECK(holds(error, "glTF: parse error at line 1"));
+}

@@ -343,6 +343,23 @@ TEST_CASE("where no capture is found, the error names one that lies below") {
   CHECK(holds(error, (folder.path / "dense/0").string() + " holds one"));
 }
 
+TEST_CASE("a file is called truncated only where JSON ends too early") {
+  scratch_folder const folder;
+  auto const refused = [&](std::string const& text) {
+    return error_of([&] { gart::load_dataset(folder.put("transforms.json", text)); });
+  };
+  for (char const* whole : {"{\"frames\": [1,]}", "{\"frames\": }", "{} {}"}) {
+    std::string const error = refused(whole);
+    CHECK(holds(error, "is not valid JSON: parse error at line 1, column"));
+    CHECK(holds(error, "(correct it at that place)"));
+  }
+  for (char const* cut : {"", "{\"frames\": [", "{\"fra"}) {
+    std::string const error = refused(cut);
+    CHECK_MESSAGE(holds(error, "(the file is truncated: copy or export it again)"), error);
+    CHECK_FALSE(holds(error, "json.exception"));
+  }
+}
+
 TEST_CASE("damaged JSON is refused and never crashes") {
   scratch_folder const folder;
   folder.put_image("a.png", 16, 12);
