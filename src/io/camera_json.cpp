@@ -118,6 +118,11 @@ bool is_json_list(fs::path const& file) {
   return false;
 }
 
+bool looks_like_camera(json const& value) {
+  if (!value.is_object() || value.contains("frames")) return false;
+  return value.contains("c2w") || value.contains("fx") || (value.contains("position") && value.contains("rotation"));
+}
+
 namespace {
 
 // 3DGS' cameras.json: the middle of the image for cx and cy, and the pose in two parts.
@@ -135,7 +140,16 @@ void read_position_and_rotation(record const& r, camera& view) {
   read_pose({whole, nullptr, r.where}, "rotation", false, view);
 }
 
+// Other programs' cameras have fields of their own. One within two letters of this is meant for it.
+void refuse_misspelt(record const& r, char const* key) {
+  if (r.has(key)) return;
+  for (auto const& [name, value] : r.own.items())
+    if (name != key && letters_between(name, key) <= 2)
+      throw io_error(r.where, "has no field '" + name.substr(0, 60) + "'" + did_you_mean(name, {key}), "correct it");
+}
+
 named_camera camera_of(record const& r) {
+  for (char const* key : {"camera_model", "shutter_type"}) refuse_misspelt(r, key);
   named_camera c;
   c.view.width = r.size("width"), c.view.height = r.size("height");
   camera_format const* const model = camera_model_of(r, "PINHOLE");

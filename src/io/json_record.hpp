@@ -120,6 +120,9 @@ void read_shutter(record const& r, char const* key, bool opengl_axes, camera& vi
 // The model that 'camera_model' names; refuses one that is not traced.
 camera_format const* camera_model_of(record const& r, char const* otherwise);
 
+// Whether an object is one of a camera JSON, and no transforms.json.
+bool looks_like_camera(json const& value);
+
 // The parameters of its lens, all but focal lengths and principal point; refuses those that the model lacks.
 void read_lens_members(record const& r, camera_format const& model, camera& view);
 

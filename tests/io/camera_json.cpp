@@ -95,3 +95,19 @@ TEST_CASE("camera JSON is in OpenCV axes") {
   CHECK(holds(error_of([&] { gart::load_cameras(folder.put("none.json", " []")); }), "holds no camera"));
   maltreat(path, text, true, [&] { gart::load_cameras(path); });
 }
+
+TEST_CASE("a misspelt camera_model is no pinhole, and other programs' fields are passed over") {
+  scratch_folder const folder;
+  auto const with = [&](std::string const& more) {
+    return error_of([&] {
+      gart::load_cameras(
+          folder.put("cameras.json",
+                     "[{\"name\": \"a\", \"width\": 16, \"height\": 12, \"fx\": 20, \"fy\": 21, \"cx\": 8, "
+                     "\"cy\": 6, \"c2w\": [[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]], " +
+                         more + "}]"));
+    });
+  };
+  CHECK(with("\"time\": 3, \"camera_id\": 4, \"camera_name\": 5").empty());
+  CHECK(holds(with("\"camera_modle\": \"FISHEYE\""), "has no field 'camera_modle'; did you mean camera_model?"));
+  CHECK(holds(with("\"shuttertype\": \"GLOBAL\""), "did you mean shutter_type?"));
+}

@@ -343,6 +343,19 @@ TEST_CASE("where no capture is found, the error names one that lies below") {
   CHECK(holds(error, (folder.path / "dense/0").string() + " holds one"));
 }
 
+TEST_CASE("a camera JSON in place of a capture, and one camera in place of a list, are called that") {
+  scratch_folder const folder;
+  auto const refused = [&](fs::path const& path) { return error_of([&] { gart::load_dataset(path); }); };
+  std::string const camera =
+      "{\"name\": \"a\", \"width\": 16, \"height\": 12, \"fx\": 20, \"fy\": 20, \"cx\": 8, \"cy\": 6, \"c2w\": " +
+      pose(1) + "}";
+  fs::path const list = folder.put("list.json", "[" + camera + "]"), one = folder.put("one.json", camera);
+  CHECK(gart::load_cameras(list).size() == 1);
+  CHECK(holds(refused(list), "is a camera JSON, which has no photographs"));
+  CHECK(holds(error_of([&] { gart::load_cameras(one); }), "put [ ] round it"));
+  CHECK(holds(refused(folder.put("numbers.json", "[1]")), "is not a JSON object"));
+}
+
 TEST_CASE("a file is called truncated only where JSON ends too early") {
   scratch_folder const folder;
   auto const refused = [&](std::string const& text) {
