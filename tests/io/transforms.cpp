@@ -343,6 +343,29 @@ TEST_CASE("where no capture is found, the error names one that lies below") {
   CHECK(holds(error, (folder.path / "dense/0").string() + " holds one"));
 }
 
+TEST_CASE("photographs without cameras are counted, and a capture one folder up is named") {
+  scratch_folder const folder;
+  auto const refused = [&](fs::path const& path) { return error_of([&] { gart::load_dataset(path); }); };
+  folder.put("images/a.jpg", ""), folder.put("images/b.JPG", ""), folder.put("images/notes.md", "");
+  for (char const* path : {"", "images", "images/"}) {
+    CHECK(holds(refused(folder.path / path), "holds 2 photographs but no cameras"));
+    CHECK(holds(refused(folder.path / path), "COLMAP: docs/getting_started.md"));
+  }
+  folder.put("transforms.json", "{}");
+  for (char const* path : {"images", "images/"})
+    CHECK(holds(refused(folder.path / path),
+                "but no cameras (the capture is one folder up: name " + (folder.path / "").string() + ")"));
+}
+
+TEST_CASE("a model or a training in place of a capture is called that") {
+  scratch_folder const folder;
+  auto const refused = [&](fs::path const& path) { return error_of([&] { gart::load_dataset(path); }); };
+  fs::path const model = folder.put("run/model.ply", "");
+  CHECK(holds(refused(model), "is a model, where a capture is wanted (name a capture; the two may be swapped"));
+  CHECK(holds(refused(folder.path / "run"), "is the folder of a training, where a capture is wanted"));
+  CHECK(holds(refused(folder.path / "run"), "name " + model.string()));
+}
+
 TEST_CASE("a camera JSON in place of a capture, and one camera in place of a list, are called that") {
   scratch_folder const folder;
   auto const refused = [&](fs::path const& path) { return error_of([&] { gart::load_dataset(path); }); };
