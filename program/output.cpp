@@ -2,6 +2,7 @@
 
 #include <gart/core/error.hpp>
 #include <gart/io/file.hpp>
+#include <gart/io/json_fault.hpp>
 
 #include <unistd.h>
 
@@ -56,7 +57,10 @@ nlohmann::json read_json(fs::path const& file) {
   try {
     return nlohmann::json::parse(bytes.begin(), bytes.end(), bounded);
   } catch (nlohmann::json::exception const& e) {
-    throw gart::io_error(file.string(), std::string("is not JSON: ") + e.what(), "restore it, or start anew");
+    gart::json_fault const fault = gart::json_fault_of(e.what());
+    throw gart::io_error(
+        file.string(), "is not JSON: " + fault.what,
+        fault.cut ? "it is truncated: restore it, or start anew" : "correct it at that place, or start anew");
   }
 }
 

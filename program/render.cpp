@@ -49,9 +49,13 @@ std::vector<double> times_of(fs::path const& keyframes, bool closed) {
   std::ifstream file(keyframes);
   nlohmann::json const all = nlohmann::json::parse(file, nullptr, false);
   std::vector<double> times;
-  if (!all.is_array()) return times;
+  auto const has_time = [](auto const& key) { return key.is_object() && key.contains("time"); };
+  if (!all.is_array() || std::none_of(all.begin(), all.end(), has_time)) return times;
   for (auto const& key : all) {
-    if (!key.is_object() || !key.contains("time") || !key["time"].is_number()) return {};
+    if (!has_time(key) || !key["time"].is_number())
+      throw gart::io_error(keyframes.string() + ", camera " + std::to_string(times.size()),
+                           "has no number \"time\", and other keyframes have one",
+                           "give each keyframe a time, or none");
     times.push_back(key["time"].get<double>() - (times.empty() ? 0 : all[0]["time"].get<double>()));
   }
   if (times.size() < 2) return {};

@@ -8,6 +8,7 @@
 #include <gart/io/camera_file.hpp>
 
 #include <algorithm>
+#include <set>
 
 namespace gart::io {
 namespace fs = std::filesystem;
@@ -46,6 +47,13 @@ camera_format const* camera_model_of(record const& r, char const* otherwise) {
   return model;
 }
 
+namespace {
+// The coefficients of a polynomial are 0 where a file does not give them.
+bool has_polynomial(camera_kind kind) {
+  return kind == camera_kind::perspective || kind == camera_kind::fisheye || kind == camera_kind::fisheye624;
+}
+}  // namespace
+
 void read_lens_members(record const& r, camera_format const& model, camera& view) {
   if (view.kind == camera_kind::equirectangular) return;
   // Captures write all of a pinhole's terms, and name any of its models.
@@ -54,9 +62,7 @@ void read_lens_members(record const& r, camera_format const& model, camera& view
   for (int k = 0; k < form.parameters(); ++k) {
     if (is_pinhole_member(form.member(k))) continue;
     std::string const key(form.field(k));
-    bool const polynomial = view.kind == camera_kind::perspective || view.kind == camera_kind::fisheye ||
-                            view.kind == camera_kind::fisheye624;
-    set_member(view, form.member(k), polynomial ? r.number_or(key.c_str(), 0) : r.number(key.c_str()));
+    set_member(view, form.member(k), has_polynomial(view.kind) ? r.number_or(key.c_str(), 0) : r.number(key.c_str()));
   }
   for (char const* key : {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"})
     if (!form.has(key) && r.number_or(key, 0) != 0)
@@ -118,6 +124,11 @@ bool is_json_list(fs::path const& file) {
   return false;
 }
 
+bool looks_like_camera(json const& value) {
+  if (!value.is_object() || value.contains("frames")) return false;
+  return value.contains("c2w") || value.contains("fx") || (value.contains("position") && value.contains("rotation"));
+}
+
 namespace {
 
 // 3DGS' cameras.json: the middle of the image for cx and cy, and the pose in two parts.
@@ -135,7 +146,16 @@ void read_position_and_rotation(record const& r, camera& view) {
   read_pose({whole, nullptr, r.where}, "rotation", false, view);
 }
 
+// Other programs' cameras have fields of their own. One within two letters of this is meant for it.
+void refuse_misspelt(record const& r, char const* key) {
+  if (r.has(key)) return;
+  for (auto const& [name, value] : r.own.items())
+    if (name != key && letters_between(name, key) <= 2)
+      throw io_error(r.where, "has no field '" + name.substr(0, 60) + "'" + did_you_mean(name, {key}), "correct it");
+}
+
 named_camera camera_of(record const& r) {
+  for (char const* key : {"camera_model", "shutter_type"}) refuse_misspelt(r, key);
   named_camera c;
   c.view.width = r.size("width"), c.view.height = r.size("height");
   camera_format const* const model = camera_model_of(r, "PINHOLE");
@@ -217,6 +237,39 @@ std::string shutter_type_of(camera const& view) {
   return {};
 }
 
+namespace {
+
+// The focal length at which a lens sees so many degrees across the image's shorter side.
+float focal_length_by(double angle, camera const& c, std::string const& where) {
+  bool const flat = c.kind == camera_kind::perspective;
+  if (!(angle > 0 && (flat ? angle < 180 : angle <= 360)))
+    throw invalid_argument(
+        where + ": the angle " + io::json(angle).dump() + " is not " +
+        (flat ? "between 0 and 180 (correct it, or take a FISHEYE)" : "above 0, up to 360 (correct it)"));
+  constexpr double furthest = 1e6;  // focal lengths from the axis
+  double q, slope, value, ignored;
+  lens_curve const curve(c.kind, c.lens);
+  curve.curve(angle * 3.141592653589793 / 360, q, slope);
+  curve.radial(q * q, value, ignored);
+  if (!(slope > 0 && q * value > 0 && q * value < furthest))
+    throw invalid_argument(where + ": the lens does not see " + io::json(angle).dump() +
+                           " degrees (give a smaller angle, or fx)");
+  return static_cast<float>(0.5 * std::min(c.width, c.height) / (q * value));
+}
+
+// Refuses one that leaves out a parameter which has no default.
+void require_lens_members(io::camera_format const& model, std::set<std::string_view> const& given,
+                          std::string const& where) {
+  if (*model.kind == camera_kind::equirectangular || io::has_polynomial(*model.kind)) return;
+  for (int k = 0; k < model.parameters(); ++k) {
+    std::string const field(model.field(k));
+    if (!io::is_pinhole_member(field) && !given.contains(model.field(k)))
+      throw invalid_argument(where + ": '" + field + "' is missing (add " + field + "=NUMBER)");
+  }
+}
+
+}  // namespace
+
 camera seen_through(camera const& view, std::string const& text) {
   std::string const name = text.substr(0, text.find(',')), where = "camera " + text;
   io::camera_format const* const model = io::camera_format_of(name);
@@ -229,6 +282,7 @@ camera seen_through(camera const& view, std::string const& text) {
   bool const wide = c.kind != camera_kind::perspective && c.kind != camera_kind::division;
   double angle = wide ? 180 : 60, extent = 0;
   c.cx = 0.5f * static_cast<float>(c.width), c.cy = 0.5f * static_cast<float>(c.height);
+  std::set<std::string_view> given;
   for (std::size_t at = name.size(); at < text.size();) {
     std::string const pair = text.substr(at + 1, text.find(',', at + 1) - at - 1);
     std::string const key = pair.substr(0, pair.find('='));
@@ -238,25 +292,24 @@ camera seen_through(camera const& view, std::string const& text) {
     bool known = key == (parallel ? "extent" : "angle");
     if (known) (parallel ? extent : angle) = value;
     for (int k = 0; k < model->parameters(); ++k)
-      if (model->field(k) == key) io::set_member(c, model->member(k), value), known = true;
+      if (model->field(k) == key)
+        io::set_member(c, model->member(k), value), given.insert(model->field(k)), known = true;
     if (!known)
       throw invalid_argument(where + ": " + name + " has no '" + key + "' (it has " + std::string(model->fields) + ")");
     at += 1 + pair.size();
   }
-  if (parallel && c.fx == 0) {
+  require_lens_members(*model, given, where);
+  bool const has_focal = given.contains("f") || given.contains("fx");
+  if (parallel && !has_focal) {
     if (!(extent > 0))
       throw invalid_argument(where +
                              ": give extent=UNITS, what it sees across the image's shorter side, or fx, the "
                              "pixels a world unit");
     c.fx = static_cast<float>(std::min(c.width, c.height) / extent);
-  } else if (c.kind != camera_kind::equirectangular && c.fx == 0) {
-    double q, value, ignored;
-    lens_curve const curve(c.kind, c.lens);
-    curve.curve(angle * 3.141592653589793 / 360, q, ignored);
-    curve.radial(q * q, value, ignored);
-    c.fx = static_cast<float>(0.5 * std::min(c.width, c.height) / (q * value));
+  } else if (c.kind != camera_kind::equirectangular && !has_focal) {
+    c.fx = focal_length_by(angle, c, where);
   }
-  if (c.fy == 0) c.fy = c.fx;
+  if (!given.contains("fy")) c.fy = c.fx;
   io::check_camera(c, where);
   return c;
 }
@@ -270,7 +323,7 @@ named_camera parse_camera_json(std::string_view object, std::string const& where
   try {
     root = io::json::parse(object);
   } catch (io::json::exception const& e) {
-    throw io_error(where, std::string("is not valid JSON: ") + e.what(), "write {\"width\", ...}");
+    throw io_error(where, "is not valid JSON: " + json_fault_of(e.what()).what, "write {\"width\", ...}");
   }
   io::record const r{root, nullptr, where};
   if (!r.own.is_object()) throw io_error(where, "is not a JSON object", "write {\"width\", ...}");

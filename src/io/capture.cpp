@@ -1,6 +1,10 @@
 #include "capture.hpp"
 
+#include "file_names.hpp"
+
 #include <gart/core/error.hpp>
+#include <gart/core/words.hpp>
+#include <gart/io/splat_file.hpp>
 
 #include <algorithm>
 #include <cctype>
@@ -167,12 +171,21 @@ std::optional<colmap_place> colmap_of(fs::path const& capture, std::vector<std::
   return std::nullopt;
 }
 
+}  // namespace
+
 bool holds_capture(fs::path const& folder) {
   std::vector<std::string> unheard;
   std::error_code ignored;
   return colmap_of(folder, unheard) || fs::exists(folder / "transforms_train.json", ignored) ||
          fs::exists(folder / "transforms.json", ignored);
 }
+
+bool holds_training(fs::path const& folder) {
+  std::error_code ignored;
+  return fs::exists(folder / "model.ply", ignored) || fs::exists(folder / "checkpoint.gart", ignored);
+}
+
+namespace {
 
 // Of the folders at most three below, the first by name that holds a capture, such as dense/0; empty without one.
 fs::path capture_below(fs::path const& path) {
@@ -190,6 +203,31 @@ fs::path capture_below(fs::path const& path) {
   return first;
 }
 
+// Says what a folder without a capture is, and which path may have been meant.
+[[noreturn]] void refuse_folder(fs::path const& path) {
+  std::string what = "holds no capture that gart reads";
+  if (fs::path const below = capture_below(path); !below.empty())
+    throw io_error(path.string(), what, below.string() + " holds one: name it");
+  if (holds_training(path))
+    throw io_error(path.string(), "is the folder of a training, where a capture is wanted",
+                   "name the capture; where a model is wanted, name " + (path / "model.ply").string());
+  std::size_t const photos = file_names(path).size();
+  if (photos) what = "holds " + counted(photos, "photograph") + " but no cameras";
+  fs::path const up = ((path.has_filename() ? path : path.parent_path()) / "..").lexically_normal();
+  if (holds_capture(up)) throw io_error(path.string(), what, "the capture is one folder up: name " + up.string());
+  throw io_error(
+      path.string(), what,
+      photos
+          ? "find the cameras with COLMAP: docs/getting_started.md says how"
+          : "expected sparse/0 (COLMAP), transforms_train.json (Blender) or transforms.json (nerfstudio, instant-ngp)");
+}
+
+bool is_named_as_model(fs::path const& file) {
+  auto const formats = splat_formats();
+  std::string const name = lower(file.filename().string());
+  return std::any_of(formats.begin(), formats.end(), [&](auto const* f) { return name.ends_with(f->extension); });
+}
+
 capture read_files(fs::path const& path, fs::path const& photos) {
   std::error_code ignored;
   if (!fs::exists(path, ignored)) throw io_error(path.string(), "there is no such file or folder", "check the path");
@@ -200,6 +238,9 @@ capture read_files(fs::path const& path, fs::path const& photos) {
     if (extension == ".json") return read_transforms(path);
     bool const model = path.stem() == "cameras" || path.stem() == "images" || path.stem() == "points3D";
     if (model && (extension == ".bin" || extension == ".txt")) return read_colmap(folder, extension == ".txt", photos);
+    if (is_named_as_model(path))
+      throw io_error(path.string(), "is a model, where a capture is wanted",
+                     "name a capture; the two may be swapped, for the model comes first");
     throw io_error(path.string(), "is not a capture that gart reads",
                    "name a folder, a transforms.json, or a COLMAP cameras.bin or cameras.txt");
   }
@@ -218,12 +259,7 @@ capture read_files(fs::path const& path, fs::path const& photos) {
   }
   if (fs::exists(path / "transforms_train.json", ignored)) return read_blender(path);
   if (fs::exists(transforms, ignored)) return read_transforms(transforms);
-  fs::path const below = capture_below(path);
-  throw io_error(
-      path.string(), "holds no capture that gart reads",
-      below.empty()
-          ? "expected sparse/0 (COLMAP), transforms_train.json (Blender) or transforms.json (nerfstudio, instant-ngp)"
-          : below.string() + " holds one: name it");
+  refuse_folder(path);
 }
 
 }  // namespace

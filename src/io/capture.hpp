@@ -50,6 +50,10 @@ struct capture {
   bool synthetic_bounds = false;  // Blender's box, not one around the cameras
 };
 
+// Whether a folder is one that a capture is named by, or what gart train leaves.
+bool holds_capture(std::filesystem::path const& folder);
+bool holds_training(std::filesystem::path const& folder);
+
 // Which files a path means, and what to say about the choice; with their photos and masks.
 capture read_capture(std::filesystem::path const& path, dataset_options const& options);
 

@@ -8,6 +8,7 @@
 #include "surface.hpp"
 
 #include <gart/io/file.hpp>
+#include <gart/io/json_fault.hpp>
 #include <gart/io/origin.hpp>
 #include <gart/io/splat_file.hpp>
 #include <gart/math/logit.hpp>
@@ -34,7 +35,7 @@ class glb_reader {
     try {
       return from(file_.root(), traits, notes);
     } catch (json::exception const& e) {
-      throw io_error(name_ + ": glTF", e.what(), "export it again");
+      throw io_error(name_ + ": glTF", json_fault_of(e.what()).what, "export it again");
     }
   }
 

@@ -3,6 +3,7 @@
 #include "bytes.hpp"
 
 #include <gart/io/file.hpp>
+#include <gart/io/json_fault.hpp>
 
 #include <string_view>
 
@@ -54,6 +55,7 @@ std::string decoded(std::string const& uri) {
 gltf_document::gltf_document(std::filesystem::path const& path)
     : name_(path.string()), folder_(path.parent_path()), bytes_(read_file(path)) {
   byte_reader in(bytes_, name_);
+  if (bytes_.empty()) refuse("is empty", cut);
   try {
     if (bytes_.size() < 4 || in.get<u32>("the magic number") != glb_magic) {
       root_ = json::parse(bytes_.begin(), bytes_.end());
@@ -73,7 +75,7 @@ gltf_document::gltf_document(std::filesystem::path const& path)
     }
     if (!known || !root_.is_object()) refuse("has no JSON chunk");
   } catch (json::exception const& e) {
-    throw io_error(name_ + ": glTF", e.what(), "export it again");
+    throw io_error(name_ + ": glTF", json_fault_of(e.what()).what, "export it again");
   }
 }
 

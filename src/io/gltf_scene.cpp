@@ -6,6 +6,7 @@
 #include "scene_parts.hpp"
 #include "unusable.hpp"
 
+#include <gart/io/json_fault.hpp>
 #include <gart/scene/similarity.hpp>
 
 #include <map>
@@ -61,7 +62,7 @@ class gltf_reader {
         notes_.push_back(counted(n, what.c_str()) + " of " + file_.name() + " left out");
       return std::move(out_);
     } catch (json::exception const& e) {
-      throw io_error(file_.name() + ": glTF", e.what(), "export it again");
+      throw io_error(file_.name() + ": glTF", json_fault_of(e.what()).what, "export it again");
     }
   }
 
@@ -355,7 +356,7 @@ gltf_contents gltf_contents_of(fs::path const& path) {
         for (auto const& primitive : mesh.at("primitives"))
           (has_extension(primitive, splats) ? has.splats : has.meshes) = true;
   } catch (json::exception const& e) {
-    throw io_error(file.name() + ": glTF", e.what(), "export it again");
+    throw io_error(file.name() + ": glTF", json_fault_of(e.what()).what, "export it again");
   }
   return has;
 }

@@ -5,6 +5,7 @@
 
 #include <gart/core/error.hpp>
 #include <gart/io/file.hpp>
+#include <gart/io/json_fault.hpp>
 
 #include <nlohmann/json.hpp>
 
@@ -39,7 +40,9 @@ inline json read_json(std::filesystem::path const& path) {
   try {
     return json::parse(quoted.begin(), quoted.end());
   } catch (json::exception const& e) {
-    throw io_error(path.string(), std::string("is not valid JSON: ") + e.what(), "the file is truncated or damaged");
+    json_fault const fault = json_fault_of(e.what());
+    throw io_error(path.string(), "is not valid JSON: " + fault.what,
+                   fault.cut ? "the file is truncated: copy or export it again" : "correct it at that place");
   }
 }
 
@@ -116,6 +119,9 @@ void read_shutter(record const& r, char const* key, bool opengl_axes, camera& vi
 
 // The model that 'camera_model' names; refuses one that is not traced.
 camera_format const* camera_model_of(record const& r, char const* otherwise);
+
+// Whether an object is one of a camera JSON, and no transforms.json.
+bool looks_like_camera(json const& value);
 
 // The parameters of its lens, all but focal lengths and principal point; refuses those that the model lacks.
 void read_lens_members(record const& r, camera_format const& model, camera& view);

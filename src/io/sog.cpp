@@ -9,6 +9,7 @@
 #include "zip.hpp"
 
 #include <gart/io/file.hpp>
+#include <gart/io/json_fault.hpp>
 #include <gart/io/splat_file.hpp>
 
 #include <nlohmann/json.hpp>
@@ -113,7 +114,7 @@ class sog_reader {
     try {
       return from(json::parse(entries_.get("meta.json", entries_.size() + (1 << 16))), traits, notes);
     } catch (json::exception const& e) {
-      throw io_error(name_ + ": meta.json", e.what(), "export it again");
+      throw io_error(name_ + ": meta.json", json_fault_of(e.what()).what, "export it again");
     }
   }
 

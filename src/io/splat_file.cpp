@@ -1,4 +1,5 @@
 #include "bulk.hpp"
+#include "capture.hpp"
 
 #include <gart/core/error.hpp>
 #include <gart/core/words.hpp>
@@ -48,6 +49,23 @@ splat_format const* format_of(std::filesystem::path const& path) {
   return file.is_open() ? nullptr : &ply_format;  // whose reader says what is wrong with the path
 }
 
+// Says what a path in no format is, and which path may have been meant.
+[[noreturn]] void refuse_path(std::filesystem::path const& path) {
+  std::error_code ignored;
+  std::filesystem::path const trained = path / "model.ply";
+  bool const capture = io::holds_capture(path), training = io::holds_training(path);
+  if (training && std::filesystem::exists(trained, ignored))
+    throw io_error(path.string(), "is the folder of a training", "name " + trained.string());
+  if (training)
+    throw io_error(path.string(), "is the folder of a training that has left no model.ply yet",
+                   "resume the training, which ends with one");
+  if (capture || path.extension() == ".json")
+    throw io_error(path.string(),
+                   capture ? "is a capture, where a model is wanted" : "is JSON, where a model is wanted",
+                   "name a model.ply; the two may be swapped, for the model comes first");
+  throw io_error(path.string(), "is in no format of Gaussians that gart knows", "it reads " + listed(false));
+}
+
 splat_format const& written_as(std::filesystem::path const& path) {
   splat_format const* const format = by_name(path);
   if (!format || !format->write)
@@ -73,8 +91,7 @@ span<splat_format const* const> splat_formats() { return {formats, std::size(for
 
 gaussian_model read_splats(std::filesystem::path const& path, splat_traits* traits, std::vector<std::string>* notes) {
   splat_format const* const format = format_of(path);
-  if (!format)
-    throw io_error(path.string(), "is in no format of Gaussians that gart knows", "it reads " + listed(false));
+  if (!format) refuse_path(path);
   return format->read(path, traits, notes);
 }
 

@@ -91,7 +91,13 @@ std::set<std::string> name_list(record const& r, char const* key) {
 void read_frames(fs::path const& file, part role, capture& result) {
   json const root = read_json(file);
   record const top{root, nullptr, file.string()};
+  if (root.is_array() && !root.empty() && looks_like_camera(root[0]))
+    throw io_error(top.where, "is a camera JSON, which has no photographs",
+                   "name a capture: its folder, or its transforms.json");
   if (!root.is_object()) throw io_error(top.where, "is not a JSON object", "name a transforms.json");
+  if (looks_like_camera(root))
+    throw io_error(top.where, "'frames' is missing: this is one camera",
+                   "put [ ] round it, for a camera JSON is a list");
   json const& frames = top.at("frames");
   if (!frames.is_array()) throw io_error(top.where, "'frames' is not a list", "export it again");
   auto const train = name_list(top, "train_filenames"), validate = name_list(top, "val_filenames");

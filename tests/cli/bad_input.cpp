@@ -31,6 +31,24 @@ TEST_CASE("a capture that is not there, or has no images") {
   CHECK_FALSE(fs::exists(here / "run"));
 }
 
+TEST_CASE("arguments in each other's place, or a run's folder for its model") {
+  folder const here;
+  write_capture(here / "cap");
+  fs::create_directories(here / "run");
+  gart::write_splat_ply(here / "run/model.ply", one_gaussian());
+  for (std::string const command : {"render % --out made", "eval % --out made/scores.json", "view %", "bench %"}) {
+    CAPTURE(command);
+    auto const with = [&](std::string const& files) {
+      return std::string(command).replace(command.find('%'), 1, files);
+    };
+    bool const cameras_first = has(command, "render");
+    fails(here.gart(with("cap run/model.ply")),
+          {cameras_first ? "run/model.ply: is a model" : "cap: is a capture", "swapped"});
+    fails(here.gart(with("run cap")), {"run: is the folder of a training (name run/model.ply)"});
+  }
+  CHECK_FALSE(fs::exists(here / "made"));
+}
+
 TEST_CASE("an --out that is no folder is refused before training") {
   folder const here;
   write_capture(here / "capture");

@@ -92,6 +92,11 @@ TEST_CASE("render goes along a smooth path through keyframes") {
   auto const back = here.gart("render model.ply --path timed.json --frames 5 --out timed --backend serial");
   CHECK(back.code == 1);
   CHECK_MESSAGE(has(back.err, "not after the one before"), back.err);
+  timed[2].erase("time");
+  gart::write_file(here / "timed.json", timed.dump());
+  auto const some = here.gart("render model.ply --path timed.json --frames 5 --out timed --backend serial");
+  CHECK(some.code == 1);
+  CHECK_MESSAGE(has(some.err, "timed.json, camera 2: has no number \"time\""), some.err);
 
   for (char const* wrong : {"", " keys.json --path keys.json --frames 5", " --path keys.json", " keys.json --frames 5",
                             " keys.json --closed", " --path keys.json --frames 1"}) {

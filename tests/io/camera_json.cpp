@@ -95,3 +95,43 @@ TEST_CASE("camera JSON is in OpenCV axes") {
   CHECK(holds(error_of([&] { gart::load_cameras(folder.put("none.json", " []")); }), "holds no camera"));
   maltreat(path, text, true, [&] { gart::load_cameras(path); });
 }
+
+TEST_CASE("a misspelt camera_model is no pinhole, and other programs' fields are passed over") {
+  scratch_folder const folder;
+  auto const with = [&](std::string const& more) {
+    return error_of([&] {
+      gart::load_cameras(
+          folder.put("cameras.json",
+                     "[{\"name\": \"a\", \"width\": 16, \"height\": 12, \"fx\": 20, \"fy\": 21, \"cx\": 8, "
+                     "\"cy\": 6, \"c2w\": [[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]], " +
+                         more + "}]"));
+    });
+  };
+  CHECK(with("\"time\": 3, \"camera_id\": 4, \"camera_name\": 5").empty());
+  CHECK(holds(with("\"camera_modle\": \"FISHEYE\""), "has no field 'camera_modle'; did you mean camera_model?"));
+  CHECK(holds(with("\"shuttertype\": \"GLOBAL\""), "did you mean shutter_type?"));
+}
+
+TEST_CASE("another camera by text: angles it can see, focal lengths, and all that it needs") {
+  gart::camera view;
+  view.width = 64, view.height = 48, view.fx = view.fy = 50, view.cx = 32, view.cy = 24;
+  auto const refused = [&](char const* text) { return error_of([&] { gart::seen_through(view, text); }); };
+  CHECK(gart::seen_through(view, "PINHOLE,angle=90").fx == doctest::Approx(24));
+  CHECK(gart::seen_through(view, "FISHEYE,angle=360").fx == doctest::Approx(24 / 3.1415927));
+  CHECK(gart::seen_through(view, "SIMPLE_PINHOLE,f=30").fy == 30);
+  CHECK(gart::seen_through(view, "OPENCV_FISHEYE,k1=0.02").lens.k1 == 0.02f);
+  CHECK(gart::seen_through(view, "EUCM,alpha=0.6,beta=1.1").lens.alpha == 0.6f);
+  CHECK(gart::seen_through(view, "EQUIRECTANGULAR").width == 96);
+  for (char const* text : {"PINHOLE,angle=180", "OPENCV,angle=200", "SIMPLE_PINHOLE,angle=0", "PINHOLE,angle=-20"})
+    CHECK(holds(refused(text), "is not between 0 and 180"));
+  for (char const* text : {"FISHEYE,angle=361", "FISHEYE,angle=0", "FOV,omega=1,angle=-1"})
+    CHECK(holds(refused(text), "is not above 0, up to 360"));
+  for (char const* text : {"PINHOLE,angle=179.99999", "DIVISION,k=0.1,angle=180", "EUCM,alpha=0,beta=1"})
+    CHECK_MESSAGE(holds(refused(text), "the lens does not see"), text);
+  for (char const* text : {"PINHOLE,fx=0", "SIMPLE_PINHOLE,f=0", "PINHOLE,fx=30,fy=0", "ORTHOGRAPHIC,fx=0,extent=2"})
+    CHECK_MESSAGE(holds(refused(text), "focal length"), text);
+  CHECK(holds(refused("EUCM"), "'alpha' is missing (add alpha=NUMBER)"));
+  CHECK(holds(refused("EUCM,alpha=0.6"), "'beta' is missing"));
+  CHECK(holds(refused("FOV"), "'omega' is missing"));
+  CHECK(holds(refused("SIMPLE_DIVISION"), "'k' is missing"));
+}

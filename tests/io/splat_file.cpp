@@ -72,3 +72,23 @@ TEST_CASE("formats have names, endings and readers, and know their own") {
 }
 
 }  // namespace
+
+TEST_CASE("a training, a capture or cameras in place of a model are called that") {
+  scratch_folder const folder;
+  auto const refused = [&](fs::path const& path) { return error_of([&] { gart::read_splats(path); }); };
+  folder.put("cap/transforms.json", "{}"), folder.put("early/checkpoint.gart", "");
+  fs::path const model = folder.put("run/model.ply", "");
+  CHECK(holds(refused(folder.path / "run"), "is the folder of a training (name " + model.string() + ")"));
+  CHECK(holds(refused(folder.path / "early"), "that has left no model.ply yet (resume the training"));
+  for (char const* path : {"cap", "cap/transforms.json"}) {
+    CHECK(holds(refused(folder.path / path), ", where a model is wanted"));
+    CHECK(holds(refused(folder.path / path), "the two may be swapped"));
+  }
+}
+
+TEST_CASE("a glTF file that is empty or no JSON is refused without the parser's own names") {
+  scratch_folder const folder;
+  CHECK(holds(error_of([&] { gart::read_splats(folder.put("a.glb", "")); }), "is empty (the file is truncated"));
+  std::string const error = error_of([&] { gart::read_splats(folder.put("b.glb", "{\"meshes\": [1,]}")); });
+  CHECK(holds(error, "glTF: parse error at line 1"));
+}

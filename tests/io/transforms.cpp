@@ -343,6 +343,59 @@ TEST_CASE("where no capture is found, the error names one that lies below") {
   CHECK(holds(error, (folder.path / "dense/0").string() + " holds one"));
 }
 
+TEST_CASE("photographs without cameras are counted, and a capture one folder up is named") {
+  scratch_folder const folder;
+  auto const refused = [&](fs::path const& path) { return error_of([&] { gart::load_dataset(path); }); };
+  folder.put("images/a.jpg", ""), folder.put("images/b.JPG", ""), folder.put("images/notes.md", "");
+  for (char const* path : {"", "images", "images/"}) {
+    CHECK(holds(refused(folder.path / path), "holds 2 photographs but no cameras"));
+    CHECK(holds(refused(folder.path / path), "COLMAP: docs/getting_started.md"));
+  }
+  folder.put("transforms.json", "{}");
+  for (char const* path : {"images", "images/"})
+    CHECK(holds(refused(folder.path / path),
+                "but no cameras (the capture is one folder up: name " + (folder.path / "").string() + ")"));
+}
+
+TEST_CASE("a model or a training in place of a capture is called that") {
+  scratch_folder const folder;
+  auto const refused = [&](fs::path const& path) { return error_of([&] { gart::load_dataset(path); }); };
+  fs::path const model = folder.put("run/model.ply", "");
+  CHECK(holds(refused(model), "is a model, where a capture is wanted (name a capture; the two may be swapped"));
+  CHECK(holds(refused(folder.path / "run"), "is the folder of a training, where a capture is wanted"));
+  CHECK(holds(refused(folder.path / "run"), "name " + model.string()));
+}
+
+TEST_CASE("a camera JSON in place of a capture, and one camera in place of a list, are called that") {
+  scratch_folder const folder;
+  auto const refused = [&](fs::path const& path) { return error_of([&] { gart::load_dataset(path); }); };
+  std::string const camera =
+      "{\"name\": \"a\", \"width\": 16, \"height\": 12, \"fx\": 20, \"fy\": 20, \"cx\": 8, \"cy\": 6, \"c2w\": " +
+      pose(1) + "}";
+  fs::path const list = folder.put("list.json", "[" + camera + "]"), one = folder.put("one.json", camera);
+  CHECK(gart::load_cameras(list).size() == 1);
+  CHECK(holds(refused(list), "is a camera JSON, which has no photographs"));
+  CHECK(holds(error_of([&] { gart::load_cameras(one); }), "put [ ] round it"));
+  CHECK(holds(refused(folder.put("numbers.json", "[1]")), "is not a JSON object"));
+}
+
+TEST_CASE("a file is called truncated only where JSON ends too early") {
+  scratch_folder const folder;
+  auto const refused = [&](std::string const& text) {
+    return error_of([&] { gart::load_dataset(folder.put("transforms.json", text)); });
+  };
+  for (char const* whole : {"{\"frames\": [1,]}", "{\"frames\": }", "{} {}"}) {
+    std::string const error = refused(whole);
+    CHECK(holds(error, "is not valid JSON: parse error at line 1, column"));
+    CHECK(holds(error, "(correct it at that place)"));
+  }
+  for (char const* cut : {"", "{\"frames\": [", "{\"fra"}) {
+    std::string const error = refused(cut);
+    CHECK_MESSAGE(holds(error, "(the file is truncated: copy or export it again)"), error);
+    CHECK_FALSE(holds(error, "json.exception"));
+  }
+}
+
 TEST_CASE("damaged JSON is refused and never crashes") {
   scratch_folder const folder;
   folder.put_image("a.png", 16, 12);
