@@ -119,10 +119,11 @@ int run_bench(bench_arguments const& a) {
                            {"hit_buffer_bytes", hit_buffer_bytes},
                            {"peak_bytes", peak}};
   if (!a.json.empty()) write_json(a.json, result);
-  std::printf("%s, %s, %s: %zu Gaussians, %d x %d, medians of %d, mean over %zu views\n",
-              gart::to_string(configuration.backend), gart::to_string(configuration.tracer),
-              configuration.backward.c_str(), file.model.size(), cameras[0].view.width, cameras[0].view.height,
-              a.repeats, cameras.size());
+  std::string const views =
+      cameras.size() == 1 ? "of one view" : "mean over " + std::to_string(cameras.size()) + " views";
+  std::printf("%s, %s, %s: %zu Gaussians, %d x %d, medians of %d, %s\n", gart::to_string(configuration.backend),
+              gart::to_string(configuration.tracer), configuration.backward.c_str(), file.model.size(),
+              cameras[0].view.width, cameras[0].view.height, a.repeats, views.c_str());
   std::printf("  %-24s %10.3f ms\n  %-24s %10.3f ms\n", "whole step", wall, "of the processor", processor);
   for (auto const& [label, ms] : stages) std::printf("  %-24s %10.3f ms\n", label.c_str(), ms);
   std::printf("  %-24s %10.1f\n  %-24s %10s\n  %-24s %10s\n", "hits a ray", hits, "hit buffer",
@@ -146,7 +147,7 @@ void add_bench(CLI::App& app, command& selected) {
             "Measurements of each view, on a GPU of four steps in a row;\nthe median counts")
       ->check(between(1, 1000));
   add_open(*bench, "--json", a->json, "FILE", "Write the figures to this file");
-  add_quiet(*bench, a->quiet);
+  add_quiet(*bench, a->quiet, "Print the table of results alone");
   add_configuration_options(*bench, a->configuration);
   add_value(*bench, "--hit-format", a->hit_format, "NAME", "Record of a hit: float4 or half")
       ->check(name_of_a<gart::hit_format_kind>());

@@ -5,12 +5,15 @@
 #include "progress.hpp"
 
 #include <gart/core/error.hpp>
+#include <gart/core/words.hpp>
 #include <gart/io/origin.hpp>
+#include <gart/io/splat_file.hpp>
 #include <gart/math/logit.hpp>
 #include <gart/scene/select.hpp>
 #include <gart/scene/similarity.hpp>
 #include <gart/view/scene.hpp>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -79,12 +82,53 @@ gart::gaussian_model pruned(gart::gaussian_model const& model, double least_opac
   return gart::selected(model, kept);
 }
 
+// By the ending of the name.
+gart::splat_format const& format_to_write(fs::path const& out) {
+  std::string const name = gart::lower(out.filename().string());
+  std::string written;
+  for (gart::splat_format const* format : gart::splat_formats()) {
+    if (!format->write) continue;
+    if (name.ends_with(format->extension)) return *format;
+    written += (written.empty() ? "" : ", ") + std::string(format->extension);
+  }
+  throw usage_error(out.string() + ": has the ending of no format of Gaussians that gart writes (name it " + written +
+                    ")");
+}
+
+// Options that are of other formats alone.
+void check_packing(convert_arguments const& a, gart::splat_format const& format) {
+  auto const require = [&](char const* option, bool given, bool fits, char const* remedy) {
+    if (given && !fits)
+      throw usage_error(std::string(option) + ": " + format.name + " has nothing of the kind (write " + remedy +
+                        ", or leave " + option + " out)");
+  };
+  std::string_view const ending = format.extension;
+  require("--world", a.packing.world, format.capabilities.world, "a .ply or a .glb");
+  require("--spz", a.packing.spz, format.capabilities.spz, "a .glb");
+  require("--sh-bits", !a.sh_bits.empty(), ending == ".spz" || a.packing.spz, "a .spz, or a .glb with --spz");
+  require("--palette", a.packing.palette > 0, ending == ".sog", "a .sog");
+}
+
+// Empty where there is none.
+std::vector<double> box_of(std::string const& crop) {
+  if (crop.empty()) return {};
+  std::vector<double> const box = numbers("--crop", crop);
+  if (box.size() != 6)
+    throw usage_error("--crop: " + std::to_string(box.size()) + " numbers, not the 6 of two corners");
+  for (std::size_t k = 0; k < 3; ++k)
+    if (box[k] > box[k + 3])
+      throw usage_error("--crop " + crop + ": its corners are swapped, " + "xyz"[k] + " goes from " +
+                        gart::short_number(box[k]) + " to " + gart::short_number(box[k + 3]) +
+                        " (give the least corner first)");
+  return box;
+}
+
 int run_convert(convert_arguments const& a) {
   std::optional<gart::similarity> moved;
   if (!a.transform.empty()) moved = similarity_named(a.transform);
-  std::vector<double> const box = a.crop.empty() ? std::vector<double>() : numbers("--crop", a.crop);
-  if (!box.empty() && box.size() != 6)
-    throw usage_error("--crop: " + std::to_string(box.size()) + " numbers, not the 6 of two corners");
+  std::vector<double> const box = box_of(a.crop);
+  gart::splat_format const& format = format_to_write(a.out);
+  check_packing(a, format);
   gart::splat_packing packing = a.packing;
   if (!a.sh_bits.empty()) {
     auto const bits = numbers("--sh-bits", a.sh_bits);
@@ -129,8 +173,8 @@ int run_convert(convert_arguments const& a) {
   for (std::string const& note : notes) std::printf("%s\n", printable(note).c_str());
   for (std::string const& what : lost) std::printf("left out: %s\n", what.c_str());
   auto const after = static_cast<double>(fs::file_size(a.out));
-  std::printf("%s: %zu of %zu Gaussians, SH degree %d, %s", a.out.string().c_str(), model.size(), read, model.sh_degree,
-              as_bytes(after).c_str());
+  std::printf("%s: %zu of %zu Gaussians, SH degree %d, %s", a.out.string().c_str(), model.size(), read,
+              std::min(model.sh_degree, format.capabilities.sh_degree), as_bytes(after).c_str());
   if (fs::is_regular_file(a.in))
     std::printf(", %.3f of %s", after / static_cast<double>(fs::file_size(a.in)), a.in.filename().string().c_str());
   std::puts("");

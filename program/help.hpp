@@ -3,13 +3,16 @@
 // values.
 
 #include <gart/core/words.hpp>
+#include <gart/train/option_fields.hpp>
 
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -43,6 +46,13 @@ class help_formatter : public CLI::Formatter {
                             : "\nThe other options: --help-all\n") +
            CLI::Formatter::make_footer(app);
   }
+  // "--auto, --no-auto": CLI11 would show what the second one sets.
+  std::string make_option_name(CLI::Option const* option, bool positional) const override {
+    std::string name = CLI::Formatter::make_option_name(option, positional);
+    for (std::size_t at; (at = name.find("{false}")) != name.npos;) name.erase(at, 7);
+    for (std::size_t at = 0; (at = name.find(",-", at)) != name.npos; ++at) name.replace(at, 1, ", ");
+    return name;
+  }
   std::string make_option_opts(CLI::Option const* option) const override {
     if (option->get_type_size() == 0) return "";
     return " " + option->get_type_name() + (option->get_required() ? " (required)" : "");
@@ -69,11 +79,29 @@ class help_formatter : public CLI::Formatter {
   mutable bool all_ = true;
 };
 
+// Refuses numbers that a whole number's option would not take: 1e3, 1.5. What is no number is left to other checks.
+inline CLI::Validator in_whole_digits() {
+  return CLI::Validator(
+      [](std::string& text) {
+        std::int64_t whole = 0;
+        double value = 0;
+        if (text.find_first_of(".eE") == text.npos || CLI::detail::lexical_cast(text, whole) ||
+            !CLI::detail::lexical_cast(text, value))
+          return std::string();
+        std::string const refused = "'" + text + "' is not a whole number";
+        bool const digits = value == std::floor(value) && std::abs(value) < 1e15;
+        return digits ? refused + " in digits (write " + std::to_string(static_cast<long long>(value)) + ")" : refused;
+      },
+      "");
+}
+
 // An option with a value; `type` stands for it in the help: N, FILE. Left open it keeps what it has.
 template <class T>
 CLI::Option* add_open(CLI::App& app, std::string const& flag, T& value, std::string const& type,
                       std::string const& help) {
-  return app.add_option(flag, value, help)->type_name(type);
+  CLI::Option* option = app.add_option(flag, value, help)->type_name(type);
+  if constexpr (std::is_integral_v<T>) option->check(in_whole_digits());
+  return option;
 }
 // One whose default the help shows.
 template <class T>
@@ -81,7 +109,9 @@ CLI::Option* add_value(CLI::App& app, std::string const& flag, T& value, std::st
                        std::string const& help) {
   return add_open(app, flag, value, type, help)->capture_default_str();
 }
-inline void add_quiet(CLI::App& app, bool& quiet) { app.add_flag("--quiet", quiet, "Say nothing but errors"); }
+inline void add_quiet(CLI::App& app, bool& quiet, std::string const& help = "Say nothing but errors") {
+  app.add_flag("--quiet", quiet, help);
+}
 
 inline CLI::Validator one_of(std::vector<std::string> const& names) {
   return CLI::Validator(
@@ -92,15 +122,17 @@ inline CLI::Validator one_of(std::vector<std::string> const& names) {
       "");
 }
 
+// A lower bound below a millionth says that the number must be above 0.
 inline CLI::Validator between(double low, double high) {
   return CLI::Validator(
       [low, high](std::string& text) {
         double value = 0;
         if (CLI::detail::lexical_cast(text, value) && value >= low && value <= high) return std::string();
         auto const show = [](double v) {
-          return v == static_cast<long long>(v) ? std::to_string(static_cast<long long>(v)) : std::to_string(v);
+          return v == std::floor(v) ? std::to_string(static_cast<long long>(v)) : gart::short_number(v);
         };
-        return "'" + text + "' is not a number from " + show(low) + " to " + show(high);
+        return "'" + text + "' is not a number " +
+               (low > 0 && low < 1e-6 ? "above 0, at most " : "from " + show(low) + " to ") + show(high);
       },
       "");
 }

@@ -10,6 +10,7 @@
 #include <gart/core/version.hpp>
 #include <gart/core/words.hpp>
 
+#include <cctype>
 #include <cstdio>
 #include <exception>
 #include <iostream>
@@ -39,6 +40,35 @@ std::string suggested(CLI::App const& app) {
   for (std::string const& word : app.remaining(true))
     words += gart::did_you_mean(word.substr(0, word.find('=')), names);
   return words;
+}
+
+bool stands_in(std::string const& text, std::string const& name) {
+  for (std::size_t at = 0; (at = text.find(name, at)) != text.npos; at += name.size())
+    if (char const next = (text + " ")[at + name.size()]; next != '-' && !std::isalnum(next)) return true;
+  return false;
+}
+
+// The help that tells of the options in a message: all of it, where the short one leaves one of them out.
+std::string help_for(CLI::App const& command, std::string const& message) {
+  if (!command.get_help_all_ptr()) return "--help";
+  std::string const brief = command.help();
+  for (CLI::Option const* o : command.get_options({}))
+    if (stands_in(message, o->get_name()) && !stands_in(brief, "\n  " + o->get_name())) return "--help-all";
+  return "--help";
+}
+
+// What CLI11 says of an option, in plain words.
+std::string in_plain_words(CLI::ParseError const& e) {
+  std::string const said = e.what();
+  if (std::size_t const at = said.find(": At Most 1 required but received "); at != said.npos)
+    return said.substr(0, at) + ": was given more than once";
+  if (std::size_t const at = said.find(": 1 required "); at != said.npos && said.ends_with(" missing"))
+    return said.substr(0, at) + ": " + said.substr(at + 13, said.size() - at - 21) + " is missing after it";
+  std::string const odd = "Could not convert: ";
+  if (std::size_t const equals = said.find(" = "); said.starts_with(odd) && equals != said.npos)
+    return said.substr(odd.size(), equals - odd.size()) + ": '" + said.substr(equals + 3) +
+           "' is no value that belongs there";
+  return said;
 }
 
 // Output that did not reach its end is no success.
@@ -92,10 +122,13 @@ int main(int argc, char** argv) {
   } catch (CLI::ParseError const& e) {
     if (ranks::launched_rank() > 0) return e.get_exit_code() == 0 ? 0 : exit_usage;  // rank 0 says it
     if (e.get_exit_code() == 0) return flushed(app.exit(e));
-    std::string topic = "gart";
-    for (CLI::App const* sub : app.get_subcommands()) topic += " " + sub->get_name();
+    std::string topic = "gart ";
+    CLI::App const* of = &app;
+    for (CLI::App const* sub : app.get_subcommands()) topic += sub->get_name() + " ", of = sub;
     std::string const odd = dynamic_cast<CLI::RequiredError const*>(&e) ? not_understood(app) : std::string();
-    return fail(odd + e.what() + suggested(app) + " (see " + topic + " --help)", exit_usage);
+    std::string const what = odd + in_plain_words(e) + suggested(app);
+    bool const unknown = dynamic_cast<CLI::ExtrasError const*>(&e) && of->get_help_all_ptr();
+    return fail(what + " (see " + topic + (unknown ? "--help-all" : help_for(*of, what)) + ")", exit_usage);
   }
   if (!selected) {
     std::fputs(app.help().c_str(), stderr);

@@ -2,9 +2,12 @@
 
 #include "commands.hpp"
 
+#include <gart/io/camera_file.hpp>
+
 #include <algorithm>
 #include <cstdlib>
 #include <limits>
+#include <set>
 
 namespace gart_cli {
 
@@ -63,8 +66,10 @@ CLI::Validator one_of_methods() {
 }
 
 CLI::Validator kernel_degree_names() {
+  std::set<int> compiled;
+  for (auto const& there : gart::compiled_configurations()) compiled.insert(there.kernel_degree);
   std::vector<std::string> names;
-  for (int const degree : gart::kernel_degrees) names.push_back(std::to_string(degree));
+  for (int const degree : compiled) names.push_back(std::to_string(degree));
   return one_of(names);
 }
 
@@ -93,6 +98,15 @@ std::vector<gart::named_camera> cameras_from(std::filesystem::path const& file, 
     if (downscale > 1) view = gart::downscaled(view, downscale, "the camera " + name);
   }
   return cameras;
+}
+
+gart::camera through_camera(gart::camera const& view, std::string const& model) {
+  try {
+    return gart::seen_through(view, model);
+  } catch (gart::error const& e) {
+    std::string const what = e.what();
+    throw usage_error(what.starts_with("camera " + model) ? "--" + what : "--camera " + model + ": " + what);
+  }
 }
 
 void add_threads(CLI::App& app, int& threads) {

@@ -83,6 +83,8 @@ void add_downscale(CLI::App& app, int& factor);
 // Those of a dataset or a camera JSON, from the model's origin, their images shrunk. io_error where there are none.
 std::vector<gart::named_camera> cameras_from(std::filesystem::path const& file, gart::vec3d const& origin,
                                              int downscale = 1);
+// A view through the camera of --camera. usage_error where that is none.
+gart::camera through_camera(gart::camera const& view, std::string const& model);
 void add_threads(CLI::App& app, int& threads);
 void add_configuration_options(CLI::App& app, configuration_options& options);
 // --max-hits of a model to be rendered: negative where the model says.
@@ -97,6 +99,7 @@ CLI::Validator name_of_a() {
 }
 // "auto", or a method.
 CLI::Validator one_of_methods();
+// Those that some configuration of this build has.
 CLI::Validator kernel_degree_names();
 
 gart::vec3 background_color(std::string const& name);

@@ -207,7 +207,7 @@ int run_render(render_arguments a) {
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     if (!ranks::takes(i)) continue;
     auto& [name, view] = cameras[i];
-    if (!a.camera.empty()) view = gart::seen_through(view, a.camera);
+    if (!a.camera.empty()) view = through_camera(view, a.camera);
     if (a.downscale > 1) view = gart::downscaled(view, a.downscale, "the camera " + name);
     stopwatch const drawn;
     gart::rendered image = how.draw(view, options);
@@ -271,10 +271,10 @@ void add_render(CLI::App& app, command& selected) {
            "--scene: paths a pixel\n(default: 1; of a scene what it says, else 16)")
       ->check(between(1, 65536));
   add_open(*render, "--alpha-min", a->alpha_min, "A",
-           "Opacity below which a Gaussian is not hit, 0 to 1\n(default: what the model says, else 1/255)")
+           "Opacity below which a Gaussian is not hit, 0.000001 to 0.99\n(default: what the model says, else 1/255)")
       ->check(between(1e-6, 0.99));
   add_open(*render, "--transmittance-min", a->transmittance_min, "T",
-           "Transmittance below which a ray ends, 0 to 1\n(default: what the model says, else 1e-4)")
+           "Transmittance below which a ray ends, 0 to 0.99\n(default: what the model says, else 1e-4)")
       ->check(between(0, 0.99));
   add_max_hits(*render, a->max_hits);
   add_value(*render, "--images", a->images.images, "LIST",

@@ -2,6 +2,10 @@
 
 #include "progress.hpp"
 
+#include <gart/core/words.hpp>
+
+#include <cmath>
+
 namespace gart_cli {
 
 nlohmann::json to_json(gart::scores const& result) {
@@ -31,15 +35,16 @@ nlohmann::json to_json(gart::scores const& test, gart::scores const& training, s
 
 std::string in_words(gart::scores const& test, gart::scores const& training, std::size_t train_views) {
   auto const both = [](gart::scores const& s) { return fixed(s.psnr, 2) + " dB, SSIM " + fixed(s.ssim, 4) + " over "; };
-  std::string text = "test PSNR " + both(test) + std::to_string(test.views.size()) +
-                     " views; after the best affine colour of each " + fixed(test.affine_psnr, 2) +
-                     " dB, a diagnostic\n";
+  std::string text = "test PSNR " + both(test) + gart::counted(test.views.size(), "view");
+  if (std::isfinite(test.affine_psnr))
+    text += "; after the best affine colour of each " + fixed(test.affine_psnr, 2) + " dB, a diagnostic";
+  text += "\n";
   if (test.placed)
     text += "test views aligned to their photographs, which they were scored by; at the capture's poses " +
             fixed(test.captured_psnr, 2) + " dB\n";
   if (training.views.empty()) return text;
   return text + "training PSNR " + both(training) + std::to_string(training.views.size()) + " of " +
-         std::to_string(train_views) + " views\n";
+         gart::counted(train_views, "view") + "\n";
 }
 
 }  // namespace gart_cli

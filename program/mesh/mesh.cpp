@@ -6,6 +6,7 @@
 #include "printable.hpp"
 #include "progress.hpp"
 
+#include <gart/core/words.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/io/extent.hpp>
 #include <gart/runtime/model_file.hpp>
@@ -58,7 +59,21 @@ void print_score(mesh_score const& s, double extent, double threshold) {
               fixed(s.precision, 4).c_str(), fixed(s.recall, 4).c_str());
 }
 
+// What is wrong where no triangle is left.
+std::string no_surface(double voxel, double pixel) {
+  std::string const nothing = "there is no surface that the cameras see";
+  if (!(pixel > 0) || (voxel > 0.5 * pixel && voxel < 2 * pixel))
+    return nothing + " (give other cameras, or a smaller --least-part)";
+  bool const large = voxel > pixel;
+  char text[160];
+  std::snprintf(text, sizeof text, ": voxels of %.4g are too %s where a pixel is %.4g wide (give %s, as --voxel %.2g)",
+                voxel, large ? "large" : "small", pixel, large ? "smaller ones" : "larger ones", pixel);
+  return nothing + text;
+}
+
 int run_mesh(mesh_arguments const& a) {
+  if (gart::lower(a.out.extension().string()) != ".ply")
+    throw usage_error("--out " + a.out.string() + ": gart mesh writes a PLY (give a name that ends in .ply)");
   gart::model_file file = gart::load_model(a.model);
   if (file.kernel_degree != 2)
     throw gart::unsupported(a.model.string() + ": is of kernel degree " + std::to_string(file.kernel_degree) +
@@ -73,9 +88,12 @@ int run_mesh(mesh_arguments const& a) {
 
   median_depths depths(std::move(file.model), file.render);
   fusion_options options = a.fusion;
-  if (options.voxel == 0) options.voxel = pixel_width(depths.of(cameras[0].view), cameras[0].view);
+  double const pixel = pixel_width(depths.of(cameras[0].view), cameras[0].view);
+  if (options.voxel == 0) options.voxel = pixel;
   if (!(options.voxel > 0))
     throw gart::invalid_argument("the first camera sees no surface to take the size of voxels from (give --voxel)");
+  // Rays so far apart share no voxel, and the voxels of each would fill the memory.
+  if (options.voxel < 1e-3 * pixel) throw gart::invalid_argument(no_surface(options.voxel, pixel));
   fusion fused(options);
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     fused.add(depths.of(cameras[i].view));
@@ -83,8 +101,7 @@ int run_mesh(mesh_arguments const& a) {
               static_cast<double>(i + 1) / static_cast<double>(cameras.size()));
   }
   gart::triangle_mesh const mesh = fused.mesh();
-  if (mesh.triangle.empty())
-    throw gart::invalid_argument("there is no surface that the cameras see (give larger voxels, or other cameras)");
+  if (mesh.triangle.empty()) throw gart::invalid_argument(no_surface(options.voxel, pixel));
   gart::write_mesh_ply(a.out, mesh, file.origin);
   say.clear();
   if (!a.quiet)

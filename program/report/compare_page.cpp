@@ -114,7 +114,7 @@ std::string curves(std::vector<compared_run> const& runs) {
   chart steps{"Test PSNR", "dB", "iterations", {}, false, 0, false},
       times{"Test PSNR over training time", "dB", "seconds", {}, false, 0, false};
   chart loss{"Training loss", "", "iterations", {}, true, 0, false},
-      count{"Gaussians", "", "iterations", {}, false, 0, true};
+      count{"Gaussians", "", "iterations", {}, false, 0, true, true};
   for (auto const& run : runs) {
     for (chart* c : {&steps, &times}) c->series.push_back({run.name, {}, true});
     for (chart* c : {&loss, &count}) c->series.push_back({run.name, {}, false});

@@ -57,7 +57,7 @@ std::string curves(history const& course, double iterations) {
   chart loss{"Training loss", "", "iterations", {{"", {}, false}}, true, iterations, false};
   chart psnr{"PSNR", "dB", "iterations", {{"training view", {}, false}, {"test", {}, true}}, false, iterations, false};
   chart ssim{"Test SSIM", "", "iterations", {{"", {}, true}}, false, iterations, false};
-  chart count{"Gaussians", "", "iterations", {{"", {}, false}}, false, iterations, true};
+  chart count{"Gaussians", "", "iterations", {{"", {}, false}}, false, iterations, true, true};
   chart timed{"PSNR over training time",
               "dB",
               "seconds",

@@ -62,10 +62,10 @@ std::string to_svg(chart const& c) {
     if (series[i].points.empty()) continue;
     double const last = series[i].points.back().second;
     std::string const swatch = "<i class=\"swatch-" + std::to_string(i + 1) + "\"></i>";
-    svg +=
-        "<span class=\"key\">" + (series[i].name.empty() ? "" : swatch + html_escape(series[i].name) + " ") +
-        (last >= 1000 ? with_commas(static_cast<std::uint64_t>(std::llround(last))) : fixed(last, last < 1 ? 4 : 2)) +
-        html_escape(c.unit.empty() ? "" : " " + c.unit) + "</span>";
+    svg += "<span class=\"key\">" + (series[i].name.empty() ? "" : swatch + html_escape(series[i].name) + " ") +
+           (c.counts || last >= 1000 ? with_commas(static_cast<std::uint64_t>(std::llround(last)))
+                                     : fixed(last, last < 1 ? 4 : 2)) +
+           html_escape(c.unit.empty() ? "" : " " + c.unit) + "</span>";
   }
   svg += "</figcaption>" + area.begin(c.title, c.x_label, false);
   for (std::size_t i = 0; i < series.size(); ++i) {

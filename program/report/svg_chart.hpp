@@ -20,6 +20,7 @@ struct chart {
   bool logarithmic = false;          // y; values that are not positive are left out
   double x_max = 0;
   bool from_zero = false;  // y
+  bool counts = false;     // y: whole numbers
 };
 
 // A <figure> with the title, the last value of each series, and the plot. "" where no series has two points.

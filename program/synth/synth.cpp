@@ -4,13 +4,27 @@
 #include "synth_capture.hpp"
 #include "timing.hpp"
 
+#include <gart/io/origin.hpp>
+
 #include <cstdio>
 #include <memory>
 
 namespace gart_cli {
 namespace {
 
+// The camera and the origin are texts, which the command line does not check.
+void check_texts(synth_options const& options) {
+  if (!options.camera.empty()) through_camera(synth_cameras(1, options.size, false)[0], options.camera);
+  if (options.origin.empty()) return;
+  try {
+    gart::origin_of({{"origin", options.origin}}, "--origin");
+  } catch (gart::error const&) {
+    throw usage_error("--origin " + options.origin + ": is not three numbers (give X,Y,Z, as 500000,4000000,100)");
+  }
+}
+
 int run_synth(synth_options const& options, bool quiet) {
+  check_texts(options);
   stopwatch const whole;
   progress say(quiet);
   write_synth_capture(options, [&](int done, int total) {
@@ -54,7 +68,8 @@ void add_synth(CLI::App& app, command& selected) {
            "ORTHOGRAPHIC,\nextent=2.7 has parallel rays, 2.7 world units across");
   add_value(*synth, "--rolling", options->rolling, "DEGREES",
             "Train views through a rolling shutter: row after row while the\ncamera turns by so many degrees, "
-            "and travels");
+            "and travels; 0 to 90")
+      ->check(between(0, synth_rolling_most));
   add_open(*synth, "--origin", options->origin, "X,Y,Z",
            "Add this to all coordinates, as of a survey: 500000,4000000,100");
   synth->add_flag("--depth", options->depth,

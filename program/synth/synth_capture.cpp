@@ -195,8 +195,8 @@ void write_synth_capture(synth_options const& options, std::function<void(int do
   check_range("--samples", options.samples, synth_samples);
   check_range("--points", options.points, synth_points);
   check_range("--threads", options.threads, synth_threads);
-  if (!(options.rolling >= 0 && options.rolling <= 90))
-    throw gart::invalid_argument("--rolling " + std::to_string(options.rolling) + ": give 0 to 90 degrees");
+  if (!(options.rolling >= 0 && options.rolling <= synth_rolling_most))
+    throw gart::invalid_argument("--rolling: give 0 to 90 degrees");
 
   gart::vec3d origin(0.0);
   if (!options.origin.empty()) origin = gart::origin_of({{"origin", options.origin}}, "--origin");

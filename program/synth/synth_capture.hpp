@@ -46,6 +46,8 @@ struct synth_limits {
 inline constexpr synth_limits synth_views{1, 10000}, synth_size{8, 4096}, synth_samples{1, 4096},
     synth_points{1, 10'000'000}, synth_threads{0, 1024};
 
+inline constexpr double synth_rolling_most = 90;
+
 // Cameras over the upper hemisphere, all looking at the origin: a Fibonacci spiral, the test views between its turns.
 std::vector<gart::camera> synth_cameras(int count, int size, bool test);
 

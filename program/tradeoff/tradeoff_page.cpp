@@ -5,6 +5,8 @@
 #include "report/svg_chart.hpp"
 #include "report/svg_scatter.hpp"
 
+#include <gart/core/words.hpp>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -73,7 +75,7 @@ std::string subject_of(json const& r) {
 
 std::string method_of(json const& r) {
   return "Errors against " + reference_of(r) + " over " + with_commas(r["pixels"].get<std::uint64_t>()) +
-         " pixels of " + std::to_string(r["views"].size()) + " views; gradients of " +
+         " pixels of " + gart::counted(r["views"].size(), "view") + "; gradients of " +
          r["gradient_of"].get<std::string>() + ", each parameter group's |error| / |reference|. Times: medians of " +
          std::to_string(r["repeats"].get<int>()) +
          ", mean over the views, of the forward and the backward pass and what prepares them.";
@@ -158,10 +160,14 @@ std::string tradeoff_page(json const& result) {
   std::string page = page_start(title) + "<header><h1>" + title + "</h1><p class=\"soft\">" +
                      html_escape(subject_of(result)) +
                      ". A setting that another one beats in error and in time is grey.</p></header>";
-  page += "<h2>Image</h2>" + figure_of(result, "image", "Error of the image against time",
-                                       "root mean square error of the colour, 0 to 1", image_error);
-  page += "<h2>Gradients</h2>" + figure_of(result, "gradients", "Error of the gradients against time",
-                                           "relative error of the worst parameter group", gradient_error);
+  // No figure is made of a single setting.
+  auto const add = [&page](char const* heading, std::string const& figure) {
+    if (!figure.empty()) page += std::string("<h2>") + heading + "</h2>" + figure;
+  };
+  add("Image", figure_of(result, "image", "Error of the image against time",
+                         "root mean square error of the colour, 0 to 1", image_error));
+  add("Gradients", figure_of(result, "gradients", "Error of the gradients against time",
+                             "relative error of the worst parameter group", gradient_error));
   page += "<h2>Every setting</h2>" + table_of(settings);
   page += "<h2>How it was measured</h2><p>" + html_escape(method_of(result)) + "</p>";
   if (!result["absent"].empty()) {

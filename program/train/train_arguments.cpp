@@ -99,7 +99,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->check(one_of({"all", "seen"}));
   in_group(r.add(train, "--set", a.set, "NAME=VALUE,...",
                  "Rules by name, for measuring them: error.growth_end=0.25,\nrates.opacity=0.05 and so on "
-                 "(docs/training.md); a name that\nthere is not lists those there are"));
+                 "(docs/training.md); they are listed\nat the end of --help-all"));
   in_group(r.add(train, "--start", a.start, "MODEL.ply", "Start from these Gaussians instead"));
 
   in_group(r.add(train, "--kernel-degree", a.kernel_degree, "N",
@@ -236,6 +236,10 @@ void fill_in(CLI::App const& train, train_arguments& a) {
   if (a.preset == "quick" && !by_count) a.options.iterations = quick_iterations;
   a.length_given = by_count || a.preset == "quick" || a.time_budget > 0;
   for (std::string* path : {&a.start, &a.photos, &a.poses, &a.scene}) *path = whole_path(*path);
+  bool const by_set = a.set.has("render.antialias");
+  if (a.options.refine_lens && (a.antialias || by_set))
+    throw CLI::ValidationError("--refine-lens", std::string("lenses are not learned with antialiasing (leave ") +
+                                                    (by_set ? "--set render.antialias" : "--antialias") + " out)");
 }
 
 void continue_run(train_arguments& a) {

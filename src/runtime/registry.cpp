@@ -1,8 +1,10 @@
 // Which configurations there are, and which one a request means.
 #include <gart/core/error.hpp>
+#include <gart/core/words.hpp>
 #include <gart/runtime/registry.hpp>
 
 #include <algorithm>
+#include <iterator>
 #include <set>
 #include <utility>
 
@@ -20,44 +22,55 @@ bool matches(E wanted, E there) {
   return wanted == E::automatic || wanted == there;
 }
 
-// The words that tell a configuration from the ordinary one.
-std::string peculiarities(configuration_info const& r) {
-  std::string out;
-  auto const add = [&out](std::string const& text) { out += ", " + text; };
-  if (r.kernel_degree != 2) add("kernel degree " + std::to_string(r.kernel_degree));
-  using enum hit_format_kind;
-  if (r.hit_format != none && r.hit_format != weight && r.hit_format != float4)
-    add(std::string("hit format ") + to_string(r.hit_format));
-  if (r.depth) add("with depth");
-  if (r.ranks) add("on several ranks");
-  return out;
+// What a request asks of a configuration: a part of it, as messages name it, whether it is met, and what is there.
+struct asked {
+  char const* name;
+  bool (*met)(configuration_request const&, configuration_info const&);
+  std::string (*there)(configuration_info const&);
+};
+
+using want = configuration_request const&;
+using have = configuration_info const&;
+
+asked const parts[] = {
+    {"backend", [](want w, have t) { return matches(w.backend, t.backend); },
+     [](have t) { return std::string(to_string(t.backend)); }},
+    {"tracer", [](want w, have t) { return matches(w.tracer, t.tracer); },
+     [](have t) { return std::string(to_string(t.tracer)); }},
+    {"backward", [](want w, have t) { return w.backward == "auto" || w.backward == t.backward; },
+     [](have t) { return t.backward; }},
+    {"SH degree", [](want w, have t) { return w.sh_degree >= 0 && w.sh_degree <= t.stored_degree; },
+     [](have t) { return "to " + std::to_string(t.stored_degree); }},
+    {"kernel degree", [](want w, have t) { return w.kernel_degree == t.kernel_degree; },
+     [](have t) { return std::to_string(t.kernel_degree); }},
+    {"hit format", [](want w, have t) { return matches(w.hit_format, t.hit_format); },
+     [](have t) { return std::string(to_string(t.hit_format)); }},
+    {"depth", [](want w, have t) { return w.depth == t.depth; },
+     [](have t) { return std::string(t.depth ? "with depth" : "without depth"); }},
+    {"number of ranks", [](want w, have t) { return (w.ranks != nullptr) == t.ranks; },
+     [](have t) { return std::string(t.ranks ? "several" : "one"); }},
+    {"device", [](want w, have t) { return (w.device == 0 && !w.stream) || t.backend == backend_kind::cuda; },
+     [](have t) { return std::string(t.backend == backend_kind::cuda ? "those of cuda" : "0, without a stream"); }},
+};
+
+// All parts are met, or all but one.
+bool matches(want wanted, have there, asked const* but = nullptr) {
+  return std::all_of(std::begin(parts), std::end(parts),
+                     [&](asked const& part) { return &part == but || part.met(wanted, there); });
 }
 
-// "openmp / tiles / primitive (SH 0 3)", configurations of one kind together.
-std::string list_configurations() {
-  std::vector<std::pair<std::string, std::set<int>>> kinds;
-  for (auto const& r : configurations()) {
-    std::string const kind = std::string(to_string(r.info.backend)) + " / " + to_string(r.info.tracer) + " / " +
-                             r.info.backward + peculiarities(r.info);
-    auto const same = std::find_if(kinds.begin(), kinds.end(), [&](auto const& k) { return k.first == kind; });
-    (same == kinds.end() ? kinds.emplace_back(kind, std::set<int>{}) : *same).second.insert(r.info.stored_degree);
-  }
+// ": ruled out by its tracer (others: bvh, tiles)", by each part that alone stands in the way.
+std::string ruled_out_by(configuration_request const& wanted) {
   std::string out;
-  for (auto const& [kind, degrees] : kinds) {
-    out += (out.empty() ? "" : "; ") + kind + " (SH";
-    for (int const d : degrees) out += " " + std::to_string(d);
-    out += ")";
+  for (asked const& part : parts) {
+    std::set<std::string> there;
+    for (auto const& r : configurations())
+      if (matches(wanted, r.info, &part)) there.insert(part.there(r.info));
+    if (!there.empty())
+      out += (out.empty() ? ": ruled out by its " : " or by its ") + std::string(part.name) +
+             " (others: " + joined(there) + ")";
   }
   return out;
-}
-
-bool matches(configuration_request const& wanted, configuration_info const& there) {
-  return matches(wanted.backend, there.backend) && matches(wanted.tracer, there.tracer) &&
-         (wanted.backward == "auto" || wanted.backward == there.backward) && wanted.sh_degree >= 0 &&
-         wanted.sh_degree <= there.stored_degree && wanted.depth == there.depth &&
-         wanted.kernel_degree == there.kernel_degree && (wanted.ranks != nullptr) == there.ranks &&
-         matches(wanted.hit_format, there.hit_format) &&
-         ((wanted.device == 0 && !wanted.stream) || there.backend == backend_kind::cuda);
 }
 
 std::string as_text(configuration_request const& r) {
@@ -88,20 +101,25 @@ compiled_configuration const& find_configuration(configuration_request const& re
     if (!best || r.rank > best->rank || stores_less) best = &r;
   }
   if (best) return *best;
+  auto const built = [](auto const& is) {
+    return std::any_of(configurations().begin(), configurations().end(), [&](auto const& r) { return is(r.info); });
+  };
   bool const by_optix = request.tracer == tracer_kind::optix;
   if (!unavailable.empty())
     throw unsupported("backend " + unavailable + ": " + reason +
                       (by_optix ? "; use configuration_request.tracer = bvh, which gives the same image"
                                 : "; use configuration_request.backend = openmp, which needs no device"));
-  if (by_optix && std::none_of(configurations().begin(), configurations().end(),
-                               [](auto const& r) { return r.info.tracer == tracer_kind::optix; }))
+  if (request.backend == backend_kind::cuda && !built([](have t) { return t.backend == backend_kind::cuda; }))
+    throw unsupported(
+        "backend cuda: this gart was built without CUDA: use configuration_request.backend = openmp, which needs no "
+        "device, or configure gart with -DGART_CUDA=ON");
+  if (by_optix && !built([](have t) { return t.tracer == tracer_kind::optix; }))
     throw unsupported(
         "tracer optix is not in this build: configure gart with -DGART_OPTIX=ON -DOptiX_ROOT=FOLDER, NVIDIA's OptiX "
         "SDK, or use configuration_request.tracer = bvh, which gives the same image");
-  throw unsupported("no compiled configuration for " + as_text(request) +
-                    "; there are (backend / tracer / backward): " + list_configurations() +
-                    ". A program compiles configurations of its own with GART_REGISTER_CONFIGURATIONS: "
-                    "gart/runtime/compiled_configurations.hpp, shown by examples/5_own_configuration");
+  throw unsupported("no compiled configuration for " + as_text(request) + ruled_out_by(request) +
+                    "; gart info lists all, and GART_REGISTER_CONFIGURATIONS compiles others "
+                    "(examples/5_own_configuration)");
 }
 
 void require_shared(shared_model const* model, configuration_info const& own, int device) {

@@ -94,7 +94,8 @@ TEST_CASE("a model of another kernel is not drawn with this one") {
   fails(here.gart("render k6.ply capture --out images"), {"k6.ply", "kernel_degree is '6'", "1, 2, 3, 4, 5 or 8"});
   gart::write_splat_ply(here / "k8.ply", one_gaussian(), {{"kernel_degree", "8"}});
   fails(here.gart("render k8.ply capture --out images"),
-        {"k8.ply", "SH degree 0, kernel degree 8", "openmp / tiles / primitive", "examples/5_own_configuration"});
+        {"k8.ply", "SH degree 0, kernel degree 8: ruled out by its kernel degree (others: 2", "gart info lists all",
+         "examples/5_own_configuration"});
   gart::write_splat_ply(here / "cap.ply", one_gaussian(), {{"max_hits", "few"}});
   fails(here.gart("render cap.ply capture --out images"), {"cap.ply", "max_hits is 'few'"});
   gart::write_splat_ply(here / "a.ply", one_gaussian(), {{"alpha_min", "much"}});
@@ -107,6 +108,8 @@ TEST_CASE("a backend that this machine does not have") {
   // No device is visible, be one there or not.
   auto const run = here.gart("train capture --out run --backend cuda", "CUDA_VISIBLE_DEVICES=");
   fails(run, {"cuda"});
+  if (has(here.gart("info").out, "cuda       not in this build"))
+    fails(run, {"backend cuda: this gart was built without CUDA: use --backend openmp", "-DGART_CUDA=ON"});
   CHECK_FALSE(fs::exists(here / "run"));
 }
 

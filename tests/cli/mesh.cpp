@@ -202,4 +202,14 @@ TEST_CASE("gart mesh finds the surface of Gaussians") {
   auto const mesh = gart::read_mesh_ply(here / "mesh.ply", vec3d(5e5, 4e6, 100));
   CHECK(area_of(mesh) == doctest::Approx(12.566).epsilon(0.15));
   CHECK(has(here.gart("mesh ball.ply nowhere --out m.ply").err, "nowhere"));
+  auto const large = here.gart("mesh ball.ply cameras.json --out m.ply --voxel 100");
+  CHECK(large.code == 1);
+  CHECK_MESSAGE(has(large.err, "voxels of 100 are too large where a pixel is 0.0"), large.err);
+  CHECK(has(large.err, "(give smaller ones, as --voxel 0.0"));
+  auto const little = here.gart("mesh ball.ply cameras.json --out m.ply --voxel 1e-5");
+  CHECK(little.code == 1);
+  CHECK_MESSAGE(has(little.err, "are too small where a pixel is 0.0"), little.err);
+  CHECK(has(little.err, "(give larger ones, as --voxel 0.0"));
+  CHECK_FALSE(has(little.err, "fused"));  // refused before the work
+  CHECK_FALSE(fs::exists(here / "m.ply"));
 }

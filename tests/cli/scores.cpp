@@ -5,7 +5,10 @@
 
 #include <support/policies.hpp>
 
+#include <scores.hpp>
+
 #include <algorithm>
+#include <limits>
 #include <vector>
 
 using namespace cli_test;
@@ -55,6 +58,7 @@ TEST_CASE("train and eval score the same training views, evenly spread") {
   auto const page = text_of(here / "run/report.html");
   CHECK(has(page, "Training, 2 of 6, evenly spread"));
   CHECK(has(page, "a diagnostic, not a score"));
+  CHECK(has(page, "<b>Gaussians</b><span class=\"key\">" + metrics["gaussians"].dump() + "</span>"));
 
   auto const eval = here.gart("eval run/model.ply capture --out scores.json --backend serial");
   REQUIRE_MESSAGE(eval.code == 0, eval.err);
@@ -66,6 +70,15 @@ TEST_CASE("train and eval score the same training views, evenly spread") {
     CHECK(scores[key].get<double>() == doctest::Approx(metrics[key].get<double>()).epsilon(1e-6));
     CHECK(scores["training_scores"][key].get<double>() == doctest::Approx(training[key].get<double>()).epsilon(1e-6));
   }
+}
+
+TEST_CASE("a score that there is not goes unsaid") {
+  gart::scores test;
+  test.views.resize(1), test.psnr = 20, test.ssim = 0.5;
+  test.affine_psnr = std::numeric_limits<double>::quiet_NaN();
+  CHECK(gart_cli::in_words(test, {}, 6) == "test PSNR 20.00 dB, SSIM 0.5000 over 1 view\n");
+  test.affine_psnr = 21;
+  CHECK(has(gart_cli::in_words(test, {}, 6), "over 1 view; after the best affine colour of each 21.00 dB"));
 }
 
 TEST_CASE("affine colour forgives an exposure, PSNR does not") {

@@ -157,6 +157,13 @@ TEST_CASE("tradeoff takes cameras alone and refuses what it cannot do") {
   auto const result = here.json("trade/tradeoff.json");
   CHECK(result["settings"].size() == 2);
   CHECK(has(result["gradient_of"].get<std::string>(), "random"));
+  CHECK(has(text_of(here / "trade/tradeoff.html"), "<h2>Image</h2>"));
+  auto const alone =
+      here.gart("tradeoff cloud.ply path.json --out alone --backend serial --settings exact --views 1 --repeats 1");
+  REQUIRE_MESSAGE(alone.code == 0, alone.err);
+  auto const page = text_of(here / "alone/tradeoff.html");
+  for (char const* heading : {"<h2>Image</h2>", "<h2>Gradients</h2>"}) CHECK_FALSE(has(page, heading));
+  CHECK(has(page, "pixels of 1 view; gradients of"));
 
   auto const unknown = here.gart("tradeoff cloud.ply path.json --out none --settings speed");
   CHECK(unknown.code == 2);

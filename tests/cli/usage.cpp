@@ -36,7 +36,7 @@ TEST_CASE("train has every option that is promised, with its default") {
                              "--max-gaussians",
                              "--densify",
                              "--sh-degree",
-                             "--auto,--no-auto",
+                             "--auto, --no-auto ",
                              "(default: 3)",
                              "--downscale",
                              "--background",
@@ -105,6 +105,18 @@ TEST_CASE("wrong command lines exit with 2 and make nothing") {
            line{"render model.ply x --out made --background red", "black, white"},
            line{"eval model.ply x", "--out"},
            line{"paint", "paint"},
+           line{"train x --out made --iterations 1e3",
+                "--iterations: '1e3' is not a whole number in digits (write 1000)"},
+           line{"train x --out made --iterations 1.5", "--iterations: '1.5' is not a whole number (see"},
+           line{"train x --out made --iterations 5 --iterations 6", "--iterations: was given more than once (see"},
+           line{"train x --out made --iterations", "--iterations: N is missing after it (see"},
+           line{"train x --out made --kernel-degree 3", "--kernel-degree: '3' is none of 2"},
+           line{"train x --out made --refine-lens --antialias", "with antialiasing (leave --antialias out)"},
+           line{"train x --out made --refine-lens --set render.antialias=1", "(leave --set render.antialias out)"},
+           line{"synth --out made --rolling 400", "--rolling: '400' is not a number from 0 to 90"},
+           line{"mesh x x --out made --voxel -1", "--voxel: '-1' is not a number above 0, at most 1000000000 (see"},
+           line{"render x x --out made --depth-unit 0", "--depth-unit: '0' is not a number above 0, at most"},
+           line{"render x x --out made --alpha-min 0", "--alpha-min: '0' is not a number from 1e-06 to 0.99"},
        }) {
     CAPTURE(arguments);
     auto const result = here.gart(arguments);
@@ -122,6 +134,80 @@ TEST_CASE("wrong command lines exit with 2 and make nothing") {
   auto const bare = here.gart("");
   CHECK(bare.code == 2);
   CHECK(has(bare.err, "train"));
+}
+
+TEST_CASE("what only --help-all tells of is looked up there") {
+  folder const here;
+  for (auto const& [arguments, help] :
+       {std::pair{"--set foo=1", "--set foo: no such field (see gart train --help-all)"},
+        {"--depth-kind far", "auto, z, distance (see gart train --help-all)"},
+        {"--hit-memry=3", "; did you mean --hit-memory? (see gart train --help-all)"},
+        {"--speed", "(see gart train --help-all)"},
+        {"--iterations 0", "(see gart train --help)"}}) {
+    CAPTURE(arguments);
+    auto const result = here.gart(std::string("train x --out made ") + arguments);
+    CHECK(result.code == 2);
+    CHECK_MESSAGE(has(result.err, help), result.err);
+  }
+  CHECK_FALSE(has(here.gart("train --help-all").out, "lists those"));
+  for (char const* help : {"train --help", "train --help-all"}) CHECK_FALSE(has(here.gart(help).out, "{false}"));
+}
+
+TEST_CASE("values that are wrong whatever the files say exit with 2") {
+  folder const here;
+  write_capture(here / "capture");
+  gart::write_splat_ply(here / "one.ply", one_gaussian());
+  struct line {
+    char const *arguments, *says;
+  };
+  for (auto const& [arguments, says] : {
+           line{"render one.ply capture --out images --camera FOO", "--camera FOO: gart traces "},
+           line{"render one.ply capture --out images --camera FISHEYE,angle=abc",
+                "--camera FISHEYE,angle=abc: 'angle=abc' is not NAME=NUMBER"},
+           line{"synth --out made --camera FOO", "--camera FOO: gart traces "},
+           line{"synth --out made --origin 1,2", "--origin 1,2: is not three numbers (give X,Y,Z"},
+           line{"mesh one.ply capture --out made.obj", "--out made.obj: gart mesh writes a PLY"},
+           line{"mesh one.ply capture --out made", "a name that ends in .ply"},
+           line{"convert one.ply made.obj", "made.obj: has the ending of no format of Gaussians that gart writes"},
+           line{"convert one.ply made.ply --sh-bits 5,5", "--sh-bits: PLY has nothing of the kind (write a .spz"},
+           line{"convert one.ply made.glb --sh-bits 5,5", "or a .glb with --spz"},
+           line{"convert one.ply made.spz --palette 64", "--palette: SPZ has nothing of the kind (write a .sog"},
+           line{"convert one.ply made.ply --spz", "--spz: PLY has nothing of the kind (write a .glb"},
+           line{"convert one.ply made.spz --world", "--world: SPZ has nothing of the kind (write a .ply or a .glb"},
+           line{"convert one.ply made.ply --crop 1,1,1,2,-1,2",
+                "its corners are swapped, y goes from 1 to -1 (give the least corner first)"},
+       }) {
+    CAPTURE(arguments);
+    auto const result = here.gart(arguments);
+    CHECK(result.code == 2);
+    CHECK_MESSAGE(has(result.err, says), result.err);
+    for (char const* name : {"made", "made.ply", "made.spz", "made.glb", "made.obj"})
+      CHECK_FALSE(fs::exists(here / name));
+  }
+}
+
+TEST_CASE("convert says the degree that it wrote") {
+  folder const here;
+  auto model = one_gaussian();
+  model.sh_degree = 1, model.sh.resize(12, 0.1f);
+  gart::write_splat_ply(here / "one.ply", model);
+  auto const done = here.gart("convert one.ply one.splat");
+  REQUIRE_MESSAGE(done.code == 0, done.err);
+  CHECK_MESSAGE(has(done.out, "1 of 1 Gaussians, SH degree 0, "), done.out);
+  CHECK(has(here.gart("convert one.ply same.ply").out, "SH degree 1, "));
+}
+
+TEST_CASE("bench --quiet prints the table alone") {
+  folder const here;
+  write_capture(here / "capture");
+  gart::write_splat_ply(here / "one.ply", one_gaussian());
+  std::string const bench = "bench one.ply capture --backend serial --warmups 0 --repeats 1 --quiet";
+  auto const one = here.gart(bench + " --views 1");
+  REQUIRE_MESSAGE(one.code == 0, one.err);
+  CHECK(one.err.empty());
+  CHECK_MESSAGE(has(one.out, "medians of 1, of one view\n"), one.out);
+  CHECK(has(here.gart(bench + " --views 2").out, "mean over 2 views\n"));
+  CHECK(has(here.gart("bench --help").out, "Print the table of results alone"));
 }
 
 TEST_CASE("rules are set by name and kept; unknown ones are refused") {

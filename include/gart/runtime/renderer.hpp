@@ -14,7 +14,7 @@
 /// Every renderer also traces batches of any rays (rays/ray_batch.hpp). A call of forward() keeps the data for the
 /// gradient of a view or of a batch. Any number of contexts may wait.
 ///
-/// Errors: unsupported where no compiled configuration meets the request, naming those that exist and how to compile
+/// Errors: unsupported where no compiled configuration meets the request, naming what rules all out and how to compile
 /// one. Also invalid_argument for Gaussians of another SH degree, for arrays that disagree in size, and for options out
 /// of range. The same for options.rebuild_every with a tracer that builds no tree. Also out_of_memory, and other errors
 /// of the policy.

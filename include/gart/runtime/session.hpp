@@ -3,7 +3,7 @@
 /// Training behind one host-safe interface. The configuration (policy, SH degree, tracer, gradient method) is chosen
 /// at run time from the compiled ones. Code that no device compiler sees, such as the `gart` program, uses it.
 ///
-/// Errors: unsupported where no compiled configuration meets the request, naming those that exist and how to compile
+/// Errors: unsupported where no compiled configuration meets the request, naming what rules all out and how to compile
 /// one. Also out_of_memory, and other errors of the policy.
 
 #include <gart/exec/profile.hpp>
