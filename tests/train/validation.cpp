@@ -218,6 +218,11 @@ TEST_CASE("what changes nothing of a run is no candidate") {
   CHECK(!gart::default_candidates(traits, of).back().shortens);
   CHECK(of.exposure);
   CHECK(of.vignetting);
+  // Renders do not disagree, and steps overfit them little: a trial's loss counts as it is.
+  gart::capture_traits rendered;
+  rendered.clear_border = true;
+  CHECK(gart::default_candidates({}, {}).back().understated == 1);
+  CHECK(gart::default_candidates(rendered, {}).back().understated == 0);
   for (auto const& c : gart::default_candidates({}, {})) {
     CAPTURE(c.setting);
     bool const by_one_noise = c.least_noises == 1 && c.understated == 0;
