@@ -55,4 +55,10 @@ void require_degree(std::filesystem::path const& path, training_state const& sta
                  "take a checkpoint that was saved whole, or start anew");
 }
 
+void require_seed(std::filesystem::path const& path, training_state const& state, u64 seed) {
+  if (state.seed != seed)
+    throw io_error(path.string(), "is of seed " + std::to_string(state.seed) + ", this run of " + std::to_string(seed),
+                   "take that seed: train_options.seed");
+}
+
 }  // namespace gart

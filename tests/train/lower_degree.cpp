@@ -50,7 +50,7 @@ TEST_CASE_TEMPLATE("a run of degree 1 in rows of degree 3 has the same bits", E,
   CHECK(own.render(view, gart::vec3(0.0f)).color.data == resumed.render(view, gart::vec3(0.0f)).color.data);
 }
 
-TEST_CASE_TEMPLATE("other degrees of states and higher starts are refused", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("other degrees and seeds of states, and higher starts, are refused", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;
@@ -61,6 +61,9 @@ TEST_CASE_TEMPLATE("other degrees of states and higher starts are refused", E, G
   for (gart::gaussian_model* model : {&other.scene, &other.first, &other.second})
     *model = gart::with_sh_degree(std::move(*model), 3);
   CHECK_THROWS_AS(run.set_state(other), gart::invalid_argument);
+  gart::training_state of_another = run.state();
+  ++of_another.seed;
+  CHECK_THROWS_WITH_AS(run.set_state(of_another), doctest::Contains("the state is of seed"), gart::invalid_argument);
   auto const higher = gart::with_sh_degree(start, 3);
   CHECK_THROWS_AS((run_in_rows<E, 1>(exec, growing(), data, higher)), gart::invalid_argument);
 }

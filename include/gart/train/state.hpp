@@ -39,5 +39,7 @@ training_state read_checkpoint(std::filesystem::path const& path);
 training_state read_checkpoint(std::filesystem::path const& path, int sh_degree);
 /// The same for a state that was read from this checkpoint.
 void require_degree(std::filesystem::path const& path, training_state const& state, int sh_degree);
+/// And of another seed.
+void require_seed(std::filesystem::path const& path, training_state const& state, u64 seed);
 
 }  // namespace gart

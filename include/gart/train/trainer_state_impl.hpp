@@ -105,6 +105,7 @@ void basic_trainer<E, Traits, Tracer, Method, Comm>::load(std::filesystem::path 
       return read_checkpoint_collectively(comm_, plans_.ranks.rows().owners(), path);
   }();
   require_degree(path, mine, gaussians_.degree);
+  require_seed(path, mine, options_.seed);
   take_up(mine);
 }
 
