@@ -131,8 +131,8 @@ std::string choices(json const& m) {
   if (!m.contains("measured") || m["measured"].value("trials", json::array()).empty()) return html;
   json const& measured = m["measured"];
   html += "<p class=\"soft\">Tried before the run: " + text_of(measured, "why") +
-          ". PSNR is of these. A gain counts above its noise, where nothing else is said. To what a shorter run gains, "
-          "1 dB is added.</p><div class=\"box\"><table><tr><th>Setting</th><th>Value</th><th class=\"n\">PSNR, dB</th>"
+          ". PSNR is of these. A gain counts above its noise, where nothing else is said."
+          "</p><div class=\"box\"><table><tr><th>Setting</th><th>Value</th><th class=\"n\">PSNR, dB</th>"
           "<th class=\"n\">gain, dB</th><th></th></tr>";
   for (auto const& t : measured["trials"]) {
     bool const first = text_of(t, "setting").empty();

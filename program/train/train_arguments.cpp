@@ -236,7 +236,9 @@ void fill_in(CLI::App const& train, train_arguments& a) {
   if (a.preset == "quick" && !by_count) a.options.iterations = quick_iterations;
   a.length_given = by_count || a.preset == "quick" || a.time_budget > 0;
   for (std::string* path : {&a.start, &a.photos, &a.poses, &a.scene}) *path = whole_path(*path);
-  bool const by_set = a.set.has("render.antialias");
+  gart::train_options by_rules;
+  a.set.apply(by_rules);
+  bool const by_set = by_rules.render.antialias > 0;
   if (a.options.refine_lens && (a.antialias || by_set))
     throw CLI::ValidationError("--refine-lens", std::string("lenses are not learned with antialiasing (leave ") +
                                                     (by_set ? "--set render.antialias" : "--antialias") + " out)");

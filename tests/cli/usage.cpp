@@ -186,6 +186,13 @@ TEST_CASE("values that are wrong whatever the files say exit with 2") {
   }
 }
 
+TEST_CASE("a rule that turns the filter off is no antialiasing") {
+  folder const here;
+  auto const run = here.gart("train nowhere --out made --refine-lens --set render.antialias=0");
+  CHECK(run.code == 1);
+  CHECK_MESSAGE(has(run.err, "nowhere: there is no such file"), run.err);
+}
+
 TEST_CASE("convert says the degree that it wrote") {
   folder const here;
   auto model = one_gaussian();

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// The error of each pixel of an image: the mean over its channels of |image - truth|, 0 where both are white. Growth
-/// by error (train/densify/error_growth.hpp) attributes it to the Gaussians. image: [H][W][3]; error: [H][W], resized;
-/// 0 where a mask excludes the pixel. One launch, 20 bytes a pixel.
+/// The error of each pixel of an image: the mean over its channels of |image - truth|, as the loss takes it
+/// (loss/image_loss.hpp). Growth by error (train/densify/error_growth.hpp) attributes it to the Gaussians. image:
+/// [H][W][3]; error: [H][W], resized; 0 where a mask excludes the pixel. One launch, 20 bytes a pixel.
 
 #include <gart/loss/image_loss.hpp>
 

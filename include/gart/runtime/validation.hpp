@@ -21,7 +21,7 @@
 ///
 /// The length. Long runs overfit few photographs. So a third of the steps is tried last, with all that was taken,
 /// against a trial three times as long. Small images overfit less than a run's. So a trial understates what fewer
-/// steps gain, by 0.6 to 2 dB on six captures (bench/results/run_length.json). 1 dB is added before the verdict.
+/// steps gain, by 0.6 to 2 dB on six captures (bench/results/run_length.json). 1 dB is added, but not for renders.
 ///
 /// Cost: about a tenth of a run's time (plan_validation), more where the run's own images are small. Trials have a
 /// fixed number of steps: on the serial policy the choice does not depend on the machine's load. On a GPU the trials
